@@ -1,0 +1,66 @@
+"""Charts as specifications: drawn natively in the workbook and by matplotlib in the notebook."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from kfsheet.errors import ModelError
+
+if TYPE_CHECKING:
+    from kfsheet.recurrence import Recurrence
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a series is drawn: colour as RRGGBB, line ('', 'solid', 'dash'), marker, width in pt."""
+
+    colour: str
+    line: str = "solid"
+    marker: str = ""
+    width: float = 1.75
+
+
+# By role, so that truth looks like truth on every chart; colours that the colour-blind tell apart.
+LOOKS = {
+    "truth": Look("222222", width=2.25),
+    "observation": Look("E69F00", line="", marker="circle"),
+    "forecast": Look("009E73", line="", marker="diamond"),
+    "analysis": Look("0072B2", marker="circle"),
+    "free": Look("CC79A7", line="dash"),
+    "first": Look("0072B2", marker="circle"),
+    "second": Look("D55E00", marker="diamond"),
+    "band": Look("0072B2", line="dash", width=1.0),
+    "second band": Look("D55E00", line="dash", width=1.0),
+}
+
+
+@dataclass(frozen=True)
+class Series:
+    """Column ``y`` against column ``x``; a series without label stays out of the legend."""
+
+    x: str
+    y: str
+    label: str
+    role: str
+
+
+@dataclass(frozen=True)
+class Chart:
+    """One chart: axes with units, and the sentence that says what to look for."""
+
+    title: str
+    x_label: str
+    y_label: str
+    series: tuple[Series, ...]
+    note: str = ""
+    origin_top_left: bool = False
+
+    def check(self, model: Recurrence) -> None:
+        """Refuse a chart of columns or roles that do not exist."""
+        for series in self.series:
+            model.column(series.x), model.column(series.y)
+            if series.role not in LOOKS:
+                raise ModelError(
+                    f"chart {self.title!r}: no role {series.role!r}; there is {', '.join(LOOKS)}"
+                )

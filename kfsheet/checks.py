@@ -1,0 +1,121 @@
+"""What a definition may contain: the refusals of a recurrence, one function for each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Set
+from typing import Any
+
+from sympy import Basic, Expr, Float, Indexed, IndexedBase, Piecewise, Rational, Symbol
+from sympy import SympifyError, sympify
+from sympy.logic.boolalg import And, Not
+
+from kfsheet.errors import ModelError
+from kfsheet.expressions import Aggregate, Observed, column_references, lag, t
+
+LARGEST_NUMBER, LARGEST_DENOMINATOR = 1000, 16
+
+
+def checked_expression(name: str, expression: Any) -> Expr:
+    """``expression`` as SymPy, with 0.5 as 1/2, and with no other decimal number in it."""
+    try:
+        expression = sympify(expression, strict=True)
+    except SympifyError:
+        raise ModelError(f"{name} is defined as {expression!r}; give a SymPy expression") from None
+    if not isinstance(expression, Expr):
+        raise ModelError(f"{name} is defined as {expression}, which is no number in a row")
+    expression = expression.xreplace({f: _exact(f) for f in expression.atoms(Float)})
+    for number in (node for node in walk(expression) if isinstance(node, Float | Rational)):
+        if isinstance(number, Float) or not _small(number):
+            raise ModelError(
+                f"{name} holds the number {number}; make it a parameter, "
+                "so that it has a name, a unit and a place where it can be changed"
+            )
+    return expression
+
+
+def _small(number: Rational) -> bool:
+    return abs(number.p) <= LARGEST_NUMBER and number.q <= LARGEST_DENOMINATOR
+
+
+def _exact(number: Float) -> Expr:
+    """Halves, quarters, ... as fractions; any other decimal number stays, to be refused."""
+    fraction = Rational(float(number))
+    return fraction if fraction.q <= LARGEST_DENOMINATOR else number
+
+
+def walk(expression: Basic) -> Iterator[Basic]:
+    """Every node of an expression; a cell reference counts as one."""
+    yield expression
+    if not isinstance(expression, Indexed | IndexedBase):
+        for argument in expression.args:
+            yield from walk(argument)
+
+
+def scalars(expression: Basic) -> set[Symbol]:
+    """Symbols that stand for scalars, or for the row index."""
+    return {node for node in walk(expression) if isinstance(node, Symbol)}
+
+
+def columns_read(expression: Basic) -> set[str]:
+    """Names of the columns that an expression reads, row by row or as a whole."""
+    return {str(base.label) for base in expression.atoms(IndexedBase)}
+
+
+def check_symbols(name: str, expression: Expr, known: Set[Basic]) -> None:
+    """Refuse a symbol or a column that the recurrence does not know."""
+    for node in walk(expression):
+        thing = node.base if isinstance(node, Indexed) else node
+        if isinstance(thing, Symbol | IndexedBase) and thing not in known:
+            raise ModelError(
+                f"{name} reads {thing}, which is not defined; "
+                "add it with parameter(), data() or columns() first"
+            )
+
+
+def check_lags(name: str, expression: Expr, first_row: int, starts: int) -> None:
+    """Refuse a look-ahead, and a look-back beyond row 0, for a rule used from ``first_row`` on."""
+    for cell in column_references(expression):
+        back = lag(cell) if len(cell.indices) == 1 else None
+        if back is None or not back.is_Integer:
+            raise ModelError(f"{name} reads {cell}; a row is t, t - 1, t - 2, ...")
+        if back < 0:
+            raise ModelError(f"{name} reads {cell}, a later row; a recurrence looks back only")
+        if back > first_row:
+            rule = f"start value {first_row}" if first_row < starts else "the definition"
+            raise ModelError(
+                f"{name}: {rule} reads {cell}, but holds from row {first_row} on; "
+                f"give {back} start values"
+            )
+
+
+def check_observed(name: str, expression: Expr, may_be_missing: Callable[[str], bool]) -> None:
+    """Refuse a formula that reads a value which may be missing without asking first."""
+    culprit = _unguarded(expression, frozenset(), may_be_missing)
+    if culprit is not None:
+        raise ModelError(
+            f"{name} reads {culprit}, which may be missing; "
+            f"write when_observed({culprit}, ...) around the part that needs it"
+        )
+
+
+def _unguarded(e: Basic, known: frozenset, may_be_missing: Callable[[str], bool]) -> Basic | None:
+    if isinstance(e, Indexed):
+        return e if may_be_missing(str(e.base.label)) and e not in known else None
+    if isinstance(e, Observed | Aggregate):
+        return None
+    if not isinstance(e, Piecewise):
+        return next(filter(None, (_unguarded(a, known, may_be_missing) for a in e.args)), None)
+    for value, condition in e.args:
+        culprit = _unguarded(condition, known, may_be_missing)
+        culprit = culprit or _unguarded(value, known | _seen(condition), may_be_missing)
+        if culprit is not None:
+            return culprit
+        if isinstance(condition, Not):
+            known |= _seen(condition.args[0])
+    return None
+
+
+def _seen(condition: Basic) -> frozenset:
+    """Cells that hold a number wherever the condition is true."""
+    parts = condition.args if isinstance(condition, And) else (condition,)
+    return frozenset(part.args[0] for part in parts if isinstance(part, Observed))

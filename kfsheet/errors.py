@@ -1,0 +1,25 @@
+"""Errors that a person can act on: each message names the culprit and the remedy."""
+
+
+class KfsheetError(ValueError):
+    """Base of every error kfsheet raises on purpose; the command line prints it as one line."""
+
+
+class ModelError(KfsheetError):
+    """A recurrence, an exercise or one of its expressions is not well formed."""
+
+
+class DataError(KfsheetError):
+    """A number that was given, in a table, a cell or an argument, cannot be used."""
+
+
+class PrintError(KfsheetError):
+    """An expression has no equivalent in the language it should be printed in."""
+
+
+class WorkbookError(KfsheetError):
+    """A file is not a workbook, is not one of ours, or lost a part of itself."""
+
+
+class EngineError(KfsheetError):
+    """A spreadsheet engine is missing, crashed or ran out of time."""

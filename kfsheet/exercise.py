@@ -1,0 +1,81 @@
+"""An exercise bundles what belongs together: model, charts, questions, words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from kfsheet.charts import Chart
+from kfsheet.errors import ModelError
+from kfsheet.parts import Column
+from kfsheet.recurrence import Recurrence
+
+
+@dataclass(frozen=True)
+class Question:
+    """A column or derived scalar that students fill in: its name, points and a hint."""
+
+    name: str
+    points: int
+    hint: str
+
+
+@dataclass(frozen=True)
+class Exercise:
+    """A model with all that a workbook, a notebook and a coursework need beside it.
+
+    Parameters
+    ----------
+    model : Recurrence
+        The filter; its name is the name of the exercise and of its workbook.
+    about : tuple of str
+        Paragraphs for the sheet "Read me": the story, and what to try.
+    source : str
+        Where the exercise comes from.
+    charts : tuple of Chart
+        In the order in which they appear.
+    questions : tuple of Question
+        What coursework asks for.
+    notebook : str
+        File name of the notebook that walks through it, if there is one.
+
+    Raises
+    ------
+    ModelError
+        If the model is not complete, or a chart or a question names what is not there.
+    """
+
+    model: Recurrence
+    about: tuple[str, ...]
+    source: str
+    charts: tuple[Chart, ...] = ()
+    questions: tuple[Question, ...] = ()
+    notebook: str = ""
+    sections: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.model.validate()
+        for chart in self.charts:
+            chart.check(self.model)
+        for question in self.questions:
+            self._check_question(question)
+        if unknown := set(self.sections) - set(self.model.sections):
+            raise ModelError(f"{self.name} has no section {unknown.pop()!r}")
+
+    def _check_question(self, question: Question) -> None:
+        if question.name in self.model.derived_scalars:
+            return
+        column: Column = self.model.column(question.name)
+        if column.is_data:
+            raise ModelError(f"question {question.name}: the column is data, not a formula")
+        if question.points <= 0:
+            raise ModelError(f"question {question.name} has {question.points} points")
+
+    @property
+    def name(self) -> str:
+        """Identifier: on the command line, and of the workbook."""
+        return self.model.name
+
+    @property
+    def title(self) -> str:
+        """One line for people."""
+        return self.model.title

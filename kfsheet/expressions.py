@@ -1,0 +1,117 @@
+"""The few words that a recurrence adds to SymPy: row index, missing values, aggregates."""
+
+from __future__ import annotations
+
+from sympy import Expr, Function, Indexed, IndexedBase, Piecewise, Symbol, true
+from sympy.core.singleton import Singleton
+from sympy.logic.boolalg import Boolean, BooleanFunction
+
+t = Symbol("t", integer=True, nonnegative=True)
+"""The row index. ``x_a[t - 1]`` is the cell above ``x_a[t]``."""
+
+
+class Observed(BooleanFunction):
+    """``Observed(i[t])``: the cell holds a number (ISNUMBER in a sheet, not-NaN in NumPy)."""
+
+    nargs = 1
+
+    @classmethod
+    def eval(cls, cell: Expr) -> Boolean | None:
+        """A missing value is never observed; all else is decided when a row is evaluated."""
+        return ~true if cell is Missing else None
+
+
+class _Missing(Expr, metaclass=Singleton):
+    """No value: an empty cell in a sheet, NaN in NumPy."""
+
+    is_commutative = True
+    is_extended_real = True
+
+    def _sympystr(self, printer: object) -> str:
+        return "Missing"
+
+    def _latex(self, printer: object) -> str:
+        return r"\varnothing"
+
+
+Missing = _Missing()
+
+
+def when_observed(cells: Indexed | tuple[Indexed, ...], value: Expr, otherwise: Expr = Missing):
+    """``value`` where every one of ``cells`` holds a number, else ``otherwise``.
+
+    >>> from sympy import IndexedBase
+    >>> i = IndexedBase("i", real=True)
+    >>> when_observed(i[t], 2 * i[t], 0)
+    Piecewise((2*i[t], Observed(i[t])), (0, True))
+    """
+    cells = cells if isinstance(cells, tuple) else (cells,)
+    condition = true
+    for cell in cells:
+        condition &= Observed(cell)
+    return Piecewise((value, condition), (otherwise, True))
+
+
+class Aggregate(Function):
+    """A number made of all rows of a column; rows without a value are left out."""
+
+    nargs = 1
+    is_real = True
+
+    @classmethod
+    def eval(cls, column: IndexedBase) -> None:
+        """Stay symbolic: only a run of the recurrence, or a sheet, can say the value."""
+        return None
+
+
+class Mean(Aggregate):
+    """Arithmetic mean of a column."""
+
+
+class RMS(Aggregate):
+    """Root mean square of a column: sqrt(mean(x**2))."""
+
+
+class Std(Aggregate):
+    """Sample standard deviation of a column, with n - 1 in the denominator."""
+
+
+class Sum(Aggregate):
+    """Sum of a column."""
+
+
+class Count(Aggregate):
+    """How many rows of a column hold a number."""
+
+
+class Largest(Aggregate):
+    """Largest value of a column."""
+
+
+class Smallest(Aggregate):
+    """Smallest value of a column."""
+
+
+class Last(Aggregate):
+    """The value in the last row of a column."""
+
+
+class SumProduct(Aggregate):
+    """Sum of the products, row by row, of two columns."""
+
+    nargs = 2
+
+    @classmethod
+    def eval(cls, first: IndexedBase, second: IndexedBase) -> None:
+        """Stay symbolic, as every aggregate."""
+        return None
+
+
+def column_references(expression: Expr) -> set[Indexed]:
+    """Every ``column[t - k]`` that an expression reads."""
+    return expression.atoms(Indexed)
+
+
+def lag(cell: Indexed) -> Expr:
+    """How many rows above row ``t`` a reference lies: ``lag(x[t - 2])`` is 2."""
+    return t - cell.indices[0]

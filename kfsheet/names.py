@@ -1,0 +1,61 @@
+"""Which names a recurrence may use: Python's, Excel's and the generated source's rules at once."""
+
+from __future__ import annotations
+
+import keyword
+import re
+from collections.abc import Collection
+
+from openpyxl.utils import column_index_from_string
+
+LAST_COLUMN = 16_384  # XFD
+LAST_ROW = 1_048_576
+# The generated Python source, or a keyword of evaluate(), uses these itself.
+RESERVED = frozenset(
+    "t rows nan sqrt exp log sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh "
+    "sign floor ceil abs min max pi observed present mean rms std total count largest smallest "
+    "last sumproduct isnan fsum range len zip model data members executor".split()
+)
+OWN_SHEETS = ("Read me", "Parameters", "Charts", "Check")
+FORBIDDEN_IN_SHEETS = set("[]:*?/\\'{}!")
+
+
+def name_problem(name: str) -> str | None:
+    """Why ``name`` cannot be a column; None if it can."""
+    if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
+        return "a name is a letter followed by letters, digits and underscores"
+    if keyword.iskeyword(name):
+        return "this is a word of the Python language"
+    if name in RESERVED:
+        return "kfsheet uses this name itself"
+    return None
+
+
+def excel_name_problem(name: str) -> str | None:
+    """Why Excel cannot take ``name`` as the name of a cell; None if it can."""
+    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_.]*", name) or len(name) > 255:
+        return "a name in Excel is a letter followed by letters, digits, underscores and dots"
+    if re.fullmatch(r"(?i)r\d*c?\d*|c\d*", name):
+        return f"Excel reads {name} as a row or a column; add an underscore, as in {name}_"
+    if name.upper() in {"TRUE", "FALSE"}:
+        return f"Excel reads {name} as a truth value"
+    cell = re.fullmatch(r"([A-Za-z]{1,3})(\d+)", name)
+    if cell and _column(cell[1]) <= LAST_COLUMN and 1 <= int(cell[2]) <= LAST_ROW:
+        return f"Excel reads {name} as a cell; write {cell[1]}_{cell[2]}"
+    return None
+
+
+def _column(letters: str) -> int:
+    return column_index_from_string(letters) if len(letters) < 3 or letters.upper() <= "ZZZ" else 0
+
+
+def section_problem(name: str, others: Collection[str]) -> str | None:
+    """Why a worksheet cannot be called ``name`` beside ``others``; None if it can."""
+    if not name or len(name) > 31:
+        return "the name of a worksheet has 1 to 31 characters"
+    if bad := FORBIDDEN_IN_SHEETS & set(name):
+        return f"the name of a worksheet cannot contain {' '.join(sorted(bad))}"
+    twins = {o for o in (*OWN_SHEETS, *others) if o.lower() == name.lower() and o not in others}
+    if twins or any(o != name and o.lower() == name.lower() for o in others):
+        return "the workbook has another sheet of this name"
+    return None

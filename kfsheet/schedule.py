@@ -1,0 +1,98 @@
+"""In which order the cells of a recurrence can be computed.
+
+Columns are computed row by row. A column that reads a summary (the mean of a whole column) has to
+wait for a pass of its own. Within a row, columns are sorted so that each comes after those it
+reads in the same row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from sympy import Basic
+
+from kfsheet.checks import columns_read, scalars
+from kfsheet.errors import ModelError
+from kfsheet.expressions import column_references, lag
+from kfsheet.parts import Column, Scalar
+
+if TYPE_CHECKING:
+    from kfsheet.recurrence import Recurrence
+
+
+@dataclass(frozen=True)
+class Pass:
+    """One run through all rows: ``rows[k]`` is the order in row k, the last one in all others."""
+
+    rows: tuple[tuple[Column, ...], ...]
+    summaries: tuple[Scalar, ...]
+
+
+def schedule(model: Recurrence) -> list[Pass]:
+    """Passes in order; raises ModelError for a circular definition, naming the circle."""
+    level = _levels(model)
+    formulas = [c for c in model.all_columns() if not c.is_data and c.expression is not None]
+    passes = []
+    for number in range(max(level.values(), default=0) + 1):
+        columns = [c for c in formulas if level[c.name] == number]
+        starts = max((len(c.start) for c in columns), default=0)
+        rows = tuple(tuple(_in_order(columns, row)) for row in range(starts + 1))
+        after = tuple(s for s in model.summaries.values() if level[s.name] == number + 1)
+        passes.append(Pass(rows, after))
+    return [p for p in passes if p.rows[0] or p.summaries]
+
+
+def _levels(model: Recurrence) -> dict[str, int]:
+    """Pass in which a column is computed; a summary stands one level above its columns."""
+    columns, summaries = model.all_columns(), model.summaries
+    level = {item.name: 0 for item in (*columns, *summaries.values())}
+    for _ in range(len(level) + 1):
+        before = dict(level)
+        for column in columns:
+            level[column.name] = max(map(_level_of(level), column.rules), default=0)
+        for summary in summaries.values():
+            below = [level[name] + 1 for name in columns_read(summary.expression)]
+            level[summary.name] = max([*below, _level_of(level)(summary.expression)])
+        if level == before:
+            return level
+    names = ", ".join(name for name in level if level[name] > len(summaries))
+    raise ModelError(f"circular definition through a summary: {names}")
+
+
+def _level_of(level: dict[str, int]):
+    def of(expression: Basic) -> int:
+        names = columns_read(expression) | {s.name for s in scalars(expression)}
+        return max((level.get(name, 0) for name in names), default=0)
+
+    return of
+
+
+def _in_order(columns: Iterable[Column], row: int) -> list[Column]:
+    pending = list(columns)
+    waiting = {c.name: same_row(c.definition(row)) for c in pending}
+    ordered: list[Column] = []
+    while pending:
+        ready = next((c for c in pending if not waiting[c.name] & {p.name for p in pending}), None)
+        if ready is None:
+            circle = " -> ".join(_circle(pending[0].name, waiting))
+            raise ModelError(f"circular definition within a row: {circle}")
+        ordered.append(ready)
+        pending.remove(ready)
+    return ordered
+
+
+def _circle(name: str, waiting: dict[str, set[str]]) -> list[str]:
+    """Follow what each column waits for until a name comes back."""
+    path = [name]
+    while True:
+        following = min(w for w in waiting[path[-1]] if w in waiting and waiting[w])
+        if following in path:
+            return [*path[path.index(following) :], following]
+        path.append(following)
+
+
+def same_row(expression: Basic) -> set[str]:
+    """Names of the columns that an expression reads in its own row."""
+    return {str(c.base.label) for c in column_references(expression) if lag(c) == 0}
