@@ -31,12 +31,16 @@ class Parameter:
         """``value`` as a float, or a DataError that says what the parameter may be."""
         number = as_number(value, f"parameter {self.name}{where}")
         if self.sign == "positive" and number <= 0 or self.sign == "nonnegative" and number < 0:
-            bound = "greater than 0" if self.sign == "positive" else "0 or greater"
             raise DataError(
                 f"parameter {self.name}{where} is {number:g}, but {self.description} "
-                f"must be {bound}"
+                f"must be {self.bound}"
             )
         return number
+
+    @property
+    def bound(self) -> str:
+        """What the value must be, in words; '' if it may be any number."""
+        return {"positive": "greater than 0", "nonnegative": "0 or greater"}.get(self.sign, "")
 
 
 @dataclass(frozen=True)

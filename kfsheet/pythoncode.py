@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 import re
+import textwrap
 from typing import TYPE_CHECKING
 
 from sympy import Basic, Expr, Indexed, Piecewise, Symbol
@@ -131,9 +132,17 @@ def _scalar_lines(scalars: list[Scalar]) -> list[str]:
 
 def _table_lines(model: Recurrence) -> list[str]:
     data = next((c.name for c in model.all_columns() if c.is_data), None)
-    lines = ["", f"    rows = {f'len({data})' if data else model.rows}"]
     formulas = [c.name for c in model.all_columns() if not c.is_data]
-    return lines + [f"    {name} = [nan] * rows" for name in formulas]
+    return [
+        "",
+        f"    rows = {f'len({data})' if data else model.rows}",
+        *_wrapped(", ".join(formulas) + ","),
+        f"    ) = ([nan] * rows for _ in range({len(formulas)}))",
+    ]
+
+
+def _wrapped(text: str) -> list[str]:
+    return ["    (", *textwrap.wrap(text, 88, initial_indent=" " * 8, subsequent_indent=" " * 8)]
 
 
 def _row_lines(model: Recurrence, step: Pass) -> list[str]:
@@ -147,7 +156,18 @@ def _row_lines(model: Recurrence, step: Pass) -> list[str]:
         lines += ["", f"    t = {row}"]
         lines += [f"    {c.name}[t] = {python_code(c.definition(row))}" for c in step.rows[row]]
     lines += ["", f"    for t in range({f'{alone}, ' if alone else ''}rows):"]
-    return lines + [f"        {c.name}[t] = {_choice(c, alone)}" for c in general]
+    return lines + [line for c in general for line in _loop_lines(c, alone)]
+
+
+def _loop_lines(column: Column, first: int) -> list[str]:
+    """A column inside the loop, which begins with row ``first``."""
+    lines, word = [], "if"
+    for row in range(first, len(column.start)):
+        lines.append(f"        {word} t == {row}:")
+        lines.append(f"            {column.name}[t] = {python_code(column.start[row])}")
+        word = "elif"
+    general = f"{column.name}[t] = {python_code(column.expression)}"
+    return [*lines, "        else:", f"    {' ' * 8}{general}"] if lines else [f"        {general}"]
 
 
 def _fits(general: tuple[Column, ...], columns: tuple[Column, ...], row: int) -> bool:
@@ -162,19 +182,14 @@ def _fits(general: tuple[Column, ...], columns: tuple[Column, ...], row: int) ->
     return True
 
 
-def _choice(column: Column, first: int) -> str:
-    text = "".join(
-        f"{python_code(column.start[row])} if t == {row} else "
-        for row in range(first, len(column.start))
-    )
-    return text + python_code(column.expression)
-
-
 def _return_lines(model: Recurrence) -> list[str]:
-    columns = ", ".join(f"{c.name}={c.name}" for c in model.all_columns())
-    names = [*model.derived_scalars, *model.summaries]
-    scalars = ", ".join(f"{name}={name}" for name in names)
-    return ["", f"    columns = dict({columns})", f"    return columns, dict({scalars})"]
+    """Every column and scalar by name."""
+    scalars = [*model.derived_scalars, *model.summaries]
+    lines = [""]
+    for name, keys in (("columns", [c.name for c in model.all_columns()]), ("scalars", scalars)):
+        head, *rest = _wrapped(", ".join(f"{key}={key}" for key in keys))
+        lines += [f"    {name} = dict(", *rest, "    )"]
+    return [*lines, "    return columns, scalars"]
 
 
 def _prelude(text: str) -> str:

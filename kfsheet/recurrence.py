@@ -285,11 +285,9 @@ class Recurrence:
         walker = UnitWalker(known, {**self.defaults(), **(values or {})})
         problems = []
         for item in [*self.derived_scalars.values(), *self.all_columns(), *self.summaries.values()]:
-            for rule in item.rules:
-                reason = walker.problem(rule, known[item.name])
-                problem = UnitProblem(item.name, reason) if reason else None
-                if problem and problem not in problems:
-                    problems.append(problem)
+            reasons = (walker.problem(rule, known[item.name]) for rule in reversed(item.rules))
+            if reason := next(filter(None, reasons), None):
+                problems.append(UnitProblem(item.name, reason))
         return problems
 
     # -- helpers of the above --------------------------------------------------------------

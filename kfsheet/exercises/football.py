@@ -167,8 +167,8 @@ def build_model(
         m.define(high[t], 2 * sigma, "px", f"band of {d}: +2 sigma")
 
     page = "Goal line"
-    u_next, w_next, wait, z_goal, s_goal = m.columns(
-        "u_next", "w_next", "wait", "z_goal", "s_goal", section=page
+    u_next, w_next, wait, z_goal, slope, s_goal = m.columns(
+        "u_next", "w_next", "wait", "z_goal", "slope", "s_goal", section=page
     )
     step_x = (x_a[t] - x_a[t - 1]) / dt - friction(u[t]) * dt
     step_z = (z_a[t] - z_a[t - 1]) / dt - friction(w[t]) * dt - g * dt
@@ -190,12 +190,13 @@ def build_model(
         "m",
         "height at the goal line, forecast from this photo on",
     )
-    # Error propagation: x_a, z_a of this photo and of the one before, independent.
-    slope = (w_next[t] + g * dt / 2 - g * wait[t]) / u_next[t]
+    slope_then = (w_next[t] + g * (dt / 2 - wait[t])) / u_next[t]
+    m.define(slope[t], when_observed(wait[t], slope_then), "", "slope of the path at the goal line")
+    # Error propagation: x_a and z_a of this photo and of the one before, taken as independent.
     spread = (1 + wait[t] / dt) ** 2 + (wait[t] / dt) ** 2
     m.define(
         s_goal[t],
-        when_observed(wait[t], sqrt(spread * (p_z + slope**2 * p_x))),
+        when_observed((wait[t], slope[t]), sqrt(spread * (p_z + slope[t] ** 2 * p_x))),
         "m",
         "standard deviation of z_goal",
     )
@@ -206,3 +207,9 @@ def build_model(
 
 
 football = build_model()
+
+exercise = Exercise(
+    model=football,
+    about=("about",),
+    source="src",
+)

@@ -1,0 +1,228 @@
+"""A recurrence and one run of it -> the content of every cell, before any file exists.
+
+The same composition is what :mod:`kfsheet.excel.workbook` writes and what
+:mod:`kfsheet.excel.check` expects, so that neither can drift from the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import isnan
+from typing import Any, NamedTuple
+
+from openpyxl.utils import get_column_letter
+
+from kfsheet.evaluate import run
+from kfsheet.excel.layout import FIRST_ROW, PARAMETER_ROW, Layout, quote
+from kfsheet.excel.styles import LEGEND, number_format
+from kfsheet.exercise import Exercise
+from kfsheet.expressions import Missing
+from kfsheet.parts import Column
+from kfsheet.units import pretty_unit
+
+NOT_AVAILABLE = "#N/A"
+
+
+class Piece(NamedTuple):
+    """One cell: its content (``=`` begins a formula), kind of style, value of the formula."""
+
+    content: Any
+    kind: str = "text"
+    stored: Any = None
+    format: str = ""
+    align: str = ""
+
+
+@dataclass
+class Page:
+    """One worksheet: pieces by (row, column), widths by column, and where it is frozen."""
+
+    title: str
+    pieces: dict[tuple[int, int], Piece] = field(default_factory=dict)
+    widths: dict[int, float] = field(default_factory=dict)
+    heights: dict[int, float] = field(default_factory=dict)
+    merges: list[str] = field(default_factory=list)
+    names: dict[str, tuple[int, int]] = field(default_factory=dict)
+    freeze: str = ""
+
+    def put(self, row: int, column: int, content: Any, kind: str = "text", **more: Any) -> None:
+        """Place one cell."""
+        self.pieces[row, column] = Piece(content, kind, **more)
+
+
+@dataclass(frozen=True)
+class Run:
+    """Numbers of one run: columns, scalars (parameters, derived, summaries)."""
+
+    columns: dict[str, list[float]]
+    scalars: dict[str, float]
+
+    @classmethod
+    def of(cls, model, data=None, parameters=None) -> Run:
+        """Evaluate a model once."""
+        columns, scalars, values = run(model, data, parameters)
+        return cls(columns, {**values, **scalars})
+
+
+def stored(value: float, kind: str = "") -> float | str:
+    """What a spreadsheet holds for a number that may be missing."""
+    return (kind if isnan(value) else value) if isinstance(value, float) else value
+
+
+def section_page(layout: Layout, section: str, now: Run) -> Page:
+    """The worksheet of one section."""
+    model, columns = layout.model, layout.columns[section]
+    page = Page(section, freeze=f"{get_column_letter(3 if model.clock else 2)}{FIRST_ROW}")
+    page.heights[3] = 48
+    _head(page, columns["t"], model.step, "", f"number of the {model.step}", 8)
+    for row in range(model.rows):
+        page.put(FIRST_ROW + row, columns["t"], row, "index", format="0")
+    if model.clock:
+        _formula_column(page, layout, model.clock, columns["time"], now)
+    for column in model.sections[section]:
+        if column.is_data:
+            _data_column(page, column, columns[column.name], now)
+        else:
+            _formula_column(page, layout, column, columns[column.name], now)
+    return page
+
+
+def _head(page: Page, at: int, symbol: str, unit: str, words: str, width: float = 14) -> None:
+    page.put(1, at, symbol, "header", align="center")
+    page.put(2, at, pretty_unit(unit), "unit", align="center")
+    page.put(3, at, words, "words", align="wrap")
+    page.widths[at] = width
+
+
+def _data_column(page: Page, column: Column, at: int, now: Run) -> None:
+    _head(page, at, column.name, column.unit, column.description)
+    values = now.columns[column.name]
+    for row, value in enumerate(values, FIRST_ROW):
+        content = None if isnan(value) else value
+        page.put(row, at, content, "data", format=number_format(values))
+
+
+def _formula_column(page: Page, layout: Layout, column: Column, at: int, now: Run) -> None:
+    _head(page, at, column.name, column.unit, column.description)
+    values = now.columns[column.name]
+    shape = number_format(values)
+    kind = "index" if column is layout.model.clock else "formula"
+    rules = [(rule, layout.formula(rule, page.title)) for rule in column.rules]
+    for row, value in enumerate(values):
+        rule, text = rules[min(row, len(column.start))]
+        # A start without a value is an empty cell, not a formula that says so.
+        content = None if rule is Missing else text(FIRST_ROW + row)
+        page.pieces[FIRST_ROW + row, at] = Piece(content, kind, stored(value), shape)
+
+
+def parameters_page(layout: Layout, now: Run) -> Page:
+    """The worksheet of parameters, derived scalars and results."""
+    model = layout.model
+    page = Page("Parameters", widths={1: 13, 2: 14, 3: 9, 4: 52, 5: 3, 6: 14, 7: 14, 8: 9, 9: 52})
+    page.put(1, 1, model.title, "title")
+    page.put(2, 1, "Change a value in a yellow cell; every sheet and chart follows.")
+    _table(page, PARAMETER_ROW - 1, 1, "Parameters")
+    for name, parameter in model.parameters.items():
+        _, row, column = layout.scalars[name]
+        _line(page, row, column, parameter, Piece(parameter_value(now, name), "parameter"))
+    if model.derived_scalars:
+        first = min(layout.scalars[name][1] for name in model.derived_scalars)
+        _table(page, first - 1, 1, "Derived: formulas of the parameters")
+    if model.summaries:
+        _table(page, PARAMETER_ROW - 1, 6, "Results: formulas of all rows")
+    for name, scalar in {**model.derived_scalars, **model.summaries}.items():
+        sheet, row, column = layout.scalars[name]
+        value = now.scalars[name]
+        text = layout.formula(scalar.expression, sheet)(row)
+        shape = number_format([value])
+        _line(page, row, column, scalar, Piece(text, "formula", stored(value), shape))
+    return page
+
+
+def parameter_value(now: Run, name: str) -> float | int:
+    """A parameter as it is typed: 9, not 9.0."""
+    value = now.scalars[name]
+    return int(value) if value.is_integer() and abs(value) < 2**53 else value
+
+
+def _table(page: Page, row: int, column: int, title: str) -> None:
+    page.put(row - 1, column, title, "heading")
+    for n, word in enumerate(("symbol", "value", "unit", "meaning")):
+        page.put(row, column + n, word, "header")
+
+
+def _line(page: Page, row: int, column: int, item: Any, value: Piece) -> None:
+    page.put(row, column - 1, item.name, "index")
+    page.pieces[row, column] = value
+    page.put(row, column + 1, pretty_unit(item.unit), "unit", align="center")
+    page.put(row, column + 2, item.description, "words", align="wrap")
+
+
+def plotted(exercise: Exercise) -> list[str]:
+    """Formula columns on charts that may have no value; a chart would show their "" as 0."""
+    names = [n for chart in exercise.charts for s in chart.series for n in (s.x, s.y)]
+    gaps = [n for n in dict.fromkeys(names) if exercise.model.column(n).may_be_missing]
+    return [n for n in gaps if not exercise.model.column(n).is_data]
+
+
+PLOTTED_COLUMN = 27  # AA: to the right of the charts
+
+
+def charts_page(exercise: Exercise, layout: Layout, now: Run) -> Page:
+    """The worksheet of charts, with a copy of each column that a chart could misread."""
+    page = Page("Charts")
+    page.put(1, 1, exercise.title, "title")
+    names = plotted(exercise)
+    if names:
+        page.put(2, 1, "From column AA on: what is plotted where a value may be missing.", "words")
+    for at, name in enumerate(names, PLOTTED_COLUMN):
+        column = exercise.model.column(name)
+        _head(page, at, name, column.unit, f"{name} for the charts: #N/A leaves a gap")
+        sheet, number = layout.home(name)
+        letter, values = get_column_letter(number), now.columns[name]
+        for row, value in enumerate(values, FIRST_ROW):
+            cell = f"{quote(sheet)}!{letter}{row}"
+            text = f"=IF(ISNUMBER({cell}),{cell},NA())"
+            shape = number_format(values)
+            page.put(row, at, text, "formula", stored=stored(value, NOT_AVAILABLE), format=shape)
+    return page
+
+
+def chart_range(exercise: Exercise, layout: Layout, name: str) -> tuple[str, int]:
+    """Sheet and column number from which a chart takes a column."""
+    names = plotted(exercise)
+    return ("Charts", PLOTTED_COLUMN + names.index(name)) if name in names else layout.home(name)
+
+
+CHARACTERS_A_LINE = 115  # of the two columns of "Read me" together
+
+
+def readme_page(exercise: Exercise, layout: Layout) -> Page:
+    """The first worksheet: what this is, how to use it, what the colours mean."""
+    page = Page("Read me", widths={1: 22, 2: 100})
+    page.put(1, 1, exercise.title, "title")
+    row = 3
+    for paragraph in exercise.about:
+        page.put(row, 1, paragraph, "text", align="wrap")
+        page.merges.append(f"A{row}:B{row}")
+        page.heights[row] = 16 * (1 + len(paragraph) // CHARACTERS_A_LINE) + 4
+        row += 1
+    row = _block(page, row + 1, "Colours", [(w, k, k) for k, w in LEGEND.items()])
+    sheets = {"Parameters": "what you can change, and what follows: gains, errors, results"}
+    sheets |= {s: exercise.sections.get(s, "") for s in exercise.model.sections}
+    sheets["Charts"] = "live charts of the columns"
+    sheets["Check"] = "does the program that opened this file compute what kfsheet computed?"
+    row = _block(page, row + 1, "Sheets", [(w, "index", s) for s, w in sheets.items()])
+    facts = {"exercise": exercise.name, "source": exercise.source, "notebook": exercise.notebook}
+    _block(page, row + 1, "About", [(w, "index", name) for name, w in facts.items() if w])
+    page.names["kfsheet_exercise"] = (row + 2, 2)
+    return page
+
+
+def _block(page: Page, row: int, title: str, lines: list[tuple[str, str, str]]) -> int:
+    page.put(row, 1, title, "heading")
+    for words, kind, name in lines:
+        row += 1
+        page.put(row, 1, name, kind)
+        page.put(row, 2, words, "text", align="wrap")
+    return row + 1

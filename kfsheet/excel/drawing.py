@@ -1,0 +1,91 @@
+"""Chart specifications -> native scatter charts of a workbook."""
+
+from __future__ import annotations
+
+from openpyxl.chart import Reference, ScatterChart
+from openpyxl.chart import Series as NativeSeries
+from openpyxl.chart.legend import LegendEntry
+from openpyxl.chart.shapes import GraphicalProperties
+from openpyxl.drawing.line import LineProperties
+from openpyxl.utils import get_column_letter
+from openpyxl.workbook import Workbook
+
+from kfsheet.charts import LOOKS, Chart, Look, Series
+from kfsheet.excel.compose import chart_range
+from kfsheet.excel.layout import FIRST_ROW, Layout
+from kfsheet.exercise import Exercise
+
+WIDTH, HEIGHT = 17.0, 9.5  # cm
+ROWS_A_CHART, FIRST_CHART_ROW = 22, 4
+COLUMNS = (1, 12)  # in which a chart begins: two charts beside each other
+POINT = 12_700  # English metric units
+
+
+def draw(book: Workbook, exercise: Exercise, layout: Layout) -> None:
+    """Add every chart of the exercise to the sheet "Charts", each under its note."""
+    sheet = book["Charts"]
+    for n, chart in enumerate(exercise.charts):
+        row = FIRST_CHART_ROW + ROWS_A_CHART * (n // 2)
+        column = COLUMNS[n % 2]
+        sheet.cell(row, column, chart.note)
+        anchor = f"{get_column_letter(column)}{row + 1}"
+        sheet.add_chart(_native(book, exercise, layout, chart), anchor)
+
+
+def _native(book: Workbook, exercise: Exercise, layout: Layout, chart: Chart) -> ScatterChart:
+    native = ScatterChart(scatterStyle="lineMarker")
+    native.title, native.style = chart.title, 2
+    native.width, native.height = WIDTH, HEIGHT
+    native.legend.position = "b"
+    for axis, label in ((native.x_axis, chart.x_label), (native.y_axis, chart.y_label)):
+        axis.title, axis.delete, axis.number_format = label, False, "General"
+        axis.majorGridlines.spPr = _line(Look("D9D9D9", width=0.75))
+        axis.tickLblPos = "low"
+    if chart.origin_top_left:
+        native.y_axis.scaling.orientation = "maxMin"
+        native.x_axis.tickLblPos = "nextTo"
+    unlabelled = []
+    for n, series in enumerate(chart.series):
+        native.series.append(_series(book, exercise, layout, series))
+        if not series.label:
+            unlabelled.append(n)
+    _hide_from_legend(native, unlabelled)
+    return native
+
+
+def _hide_from_legend(native: ScatterChart, indices: list[int]) -> None:
+    native.legend.legendEntry = [LegendEntry(idx=n, delete=True) for n in indices]
+
+
+def _series(
+    book: Workbook, exercise: Exercise, layout: Layout, series: Series
+) -> NativeSeries:
+    x, y = (_reference(book, exercise, layout, name) for name in (series.x, series.y))
+    native = NativeSeries(y, x, title=series.label or series.y)
+    look = LOOKS[series.role]
+    native.graphicalProperties = _line(look)
+    native.marker.symbol = look.marker or "none"
+    if look.marker:
+        native.marker.size = 6
+        native.marker.graphicalProperties = GraphicalProperties(solidFill=look.colour)
+        native.marker.graphicalProperties.line.solidFill = look.colour
+    native.smooth = False
+    return native
+
+
+def _line(look: Look) -> GraphicalProperties:
+    line = LineProperties(w=round(look.width * POINT))
+    if look.line:
+        line.solidFill = look.colour
+        line.dashStyle = {"dash": "dash"}.get(look.line)
+    else:
+        line.noFill = True
+    return GraphicalProperties(ln=line)
+
+
+def _reference(book: Workbook, exercise: Exercise, layout: Layout, name: str) -> Reference:
+    sheet, column = chart_range(exercise, layout, name)
+    return Reference(
+        book[sheet], min_col=column, min_row=FIRST_ROW, max_row=layout.last_row, max_col=column
+    )
+

@@ -1,0 +1,118 @@
+"""Where everything stands in a workbook, and the formula of every cell as text.
+
+Each section has its symbols in row 1, units in row 2, words in row 3, and row ``t`` of the
+recurrence in row ``t + 4``. The step index is in the first column, the clock, if any, in the
+second. Parameters, derived scalars and summaries are defined names, equal to their symbols.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from openpyxl.utils import get_column_letter, quote_sheetname
+from sympy import Basic, Expr, Indexed, IndexedBase, Symbol
+
+from kfsheet.errors import PrintError
+from kfsheet.excel.printer import HARD_LIMIT, excel_code
+from kfsheet.expressions import Last, lag, t
+from kfsheet.recurrence import Recurrence
+
+SYMBOL_ROW, UNIT_ROW, WORDS_ROW, FIRST_ROW = 1, 2, 3, 4
+PARAMETER_ROW = 5
+
+Address = tuple[str, int, int]
+"""Sheet, row, column; rows and columns count from 1."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Column numbers by name for each worksheet, and cells of scalars.
+
+    ``columns[sheet][name]`` counts from 1; the step index has the key ``"t"``, the clock the key
+    ``"time"``; ``scalars[name]`` is an address.
+    """
+
+    model: Recurrence
+    columns: dict[str, dict[str, int]]
+    scalars: dict[str, Address]
+
+    @classmethod
+    def standard(cls, model: Recurrence) -> Layout:
+        """The layout in which workbooks are written."""
+        lead = ["t", "time"] if model.clock else ["t"]
+        columns = {
+            section: {name: n for n, name in enumerate([*lead, *(c.name for c in those)], 1)}
+            for section, those in model.sections.items()
+        }
+        scalars: dict[str, Address] = {}
+        row = PARAMETER_ROW
+        for name in model.parameters:
+            scalars[name] = ("Parameters", row, 2)
+            row += 1
+        row += 3
+        for name in model.derived_scalars:
+            scalars[name] = ("Parameters", row, 2)
+            row += 1
+        for n, name in enumerate(model.summaries):
+            scalars[name] = ("Parameters", PARAMETER_ROW + n, 7)
+        return cls(model, columns, scalars)
+
+    @property
+    def last_row(self) -> int:
+        """Row of the last step."""
+        return FIRST_ROW + self.model.rows - 1
+
+    def home(self, name: str) -> tuple[str, int]:
+        """Sheet and column number of a column of the recurrence."""
+        return next((s, those[name]) for s, those in self.columns.items() if name in those)
+
+    def range(self, name: str, sheet: str | None = None) -> str:
+        """Absolute reference to all rows of a column, ``'Free run'!$C$4:$C$19``."""
+        home, column = (sheet, self.columns[sheet][name]) if sheet else self.home(name)
+        letter = get_column_letter(column)
+        return f"{quote(home)}!${letter}${FIRST_ROW}:${letter}${self.last_row}"
+
+    def formula(self, expression: Expr, sheet: str) -> Callable[[int], str]:
+        """Formula of a row of ``sheet`` as a function of its row number, ``=`` included.
+
+        The expression is printed once; rows only fill in numbers, which keeps large sheets cheap.
+        """
+        names = _Names(self, sheet)
+        template = "=" + excel_code(expression, names)
+        depth = range(names.depth + 1)
+        if len(template.format(*(self.last_row for _ in depth))) > HARD_LIMIT:
+            raise PrintError(f"a formula on {sheet} is longer than {HARD_LIMIT}: {template}")
+        return lambda row: template.format(*(row - back for back in depth))
+
+
+class _Names:
+    """Names of symbols in a formula on one sheet; remembers how far back it looks."""
+
+    def __init__(self, layout: Layout, sheet: str) -> None:
+        self.layout, self.sheet, self.depth = layout, sheet, 0
+
+    def __call__(self, node: Basic) -> str | None:
+        if node == t:
+            return f"${get_column_letter(self.layout.columns[self.sheet]['t'])}{{0}}"
+        if isinstance(node, Symbol):
+            return node.name
+        if isinstance(node, Indexed):
+            back = int(lag(node))
+            self.depth = max(self.depth, back)
+            return self._place(str(node.base.label)) + f"{{{back}}}"
+        if isinstance(node, Last):
+            return self._place(str(node.args[0].label)) + str(self.layout.last_row)
+        return self.layout.range(str(node.label)) if isinstance(node, IndexedBase) else None
+
+    def _place(self, name: str) -> str:
+        """Sheet and column letter; the own sheet is left out, as a person would."""
+        if name in self.layout.columns.get(self.sheet, {}):
+            return get_column_letter(self.layout.columns[self.sheet][name])
+        sheet, column = self.layout.home(name)
+        return f"{quote(sheet)}!{get_column_letter(column)}"
+
+
+def quote(sheet: str) -> str:
+    """Sheet name as it stands before the ``!`` of a reference."""
+    return sheet if sheet.isidentifier() else quote_sheetname(sheet)

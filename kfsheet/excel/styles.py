@@ -1,0 +1,85 @@
+"""How cells look: one small table, so that every workbook speaks the same language of colours."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from math import floor, isfinite, log10, sqrt
+
+from openpyxl import Workbook
+from openpyxl.cell import Cell
+from openpyxl.styles import Alignment, Border, Font, PatternFill, Side
+
+DARK, LINE = "1F3864", "BFBFBF"
+KINDS = {
+    # kind: (background, text colour, bold, size)
+    "title": (None, DARK, True, 16),
+    "heading": (None, DARK, True, 12),
+    "text": (None, "000000", False, 11),
+    "header": (DARK, "FFFFFF", True, 11),
+    "unit": ("D9E2F3", "404040", False, 10),
+    "words": ("D9E2F3", "404040", False, 9),
+    "parameter": ("FFF2CC", "1F3FBF", True, 11),
+    "data": ("E2EFDA", "000000", False, 11),
+    "formula": ("FFFFFF", "000000", False, 11),
+    "index": ("F2F2F2", "595959", False, 11),
+    "answer": ("FCE4D6", "000000", False, 11),
+}
+LEGEND = {
+    "parameter": "a parameter: change it and watch what happens",
+    "data": "a measurement or another given number; an empty photo is a missing photo",
+    "formula": "a formula: it follows from the cells before it",
+    "answer": "an answer to be filled in (only in handouts)",
+}
+BOXED = set(KINDS) - {"title", "heading", "text"}
+
+
+class Styles:
+    """Shared style arrays of one workbook: styling a cell costs a look-up, not a new object."""
+
+    def __init__(self, book: Workbook) -> None:
+        self.book = book
+        self._known: dict[tuple[str, str, str], object] = {}
+
+    @cached_property
+    def _scratch(self):
+        return Workbook.create_sheet(self.book, "scratch")
+
+    def cell(self, sheet, content: object, kind: str, number_format: str = "", align: str = ""):
+        """A new cell of ``kind`` for ``sheet.append``."""
+        key = (kind, number_format, align)
+        if key not in self._known:
+            self._known[key] = self._array(*key)
+        return Cell(sheet, row=1, column=1, value=content, style_array=self._known[key])
+
+    def _array(self, kind: str, number_format: str, align: str) -> object:
+        background, colour, bold, size = KINDS[kind]
+        model = Cell(self._scratch, row=1, column=1)
+        model.font = Font(name="Calibri", size=size, bold=bold, color="FF" + colour)
+        if background:
+            model.fill = PatternFill("solid", start_color="FF" + background)
+        if kind in BOXED:
+            model.border = Border(*[Side("thin", color="FF" + LINE)] * 4)
+        wrap = align == "wrap"
+        horizontal = {"wrap": None, "": None}.get(align, align)
+        model.alignment = Alignment(horizontal=horizontal, vertical="top", wrap_text=wrap)
+        if number_format:
+            model.number_format = number_format
+        return model._style
+
+    def close(self) -> None:
+        """Remove what was needed to make styles."""
+        if "_scratch" in vars(self):
+            self.book.remove(self._scratch)
+
+
+def number_format(values: list[float]) -> str:
+    """About four figures at the column's root mean square, or scientific where that is tiny."""
+    numbers = [v for v in values if isinstance(v, int | float) and isfinite(v)]
+    size = sqrt(sum(v * v for v in numbers) / len(numbers)) if numbers else 0
+    if size == 0:
+        return "0.000"
+    magnitude = floor(log10(size))
+    if not -4 <= magnitude <= 6:
+        return "0.000E+00"
+    decimals = max(0, 3 - magnitude)
+    return "0." + "0" * decimals if decimals else "0"

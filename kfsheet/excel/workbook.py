@@ -1,0 +1,174 @@
+"""An exercise -> an .xlsx file of live formulas, with stored values, charts and a Check sheet."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from pathlib import Path
+
+from openpyxl import Workbook
+from openpyxl.formatting.rule import CellIsRule
+from openpyxl.packaging.custom import StringProperty
+from openpyxl.styles import Font, PatternFill
+from openpyxl.utils import get_column_letter, quote_sheetname
+from openpyxl.workbook.defined_name import DefinedName
+from openpyxl.worksheet.datavalidation import DataValidation
+from openpyxl.worksheet.worksheet import Worksheet
+
+from kfsheet.excel.checkpage import FAIL, PASS, check_page
+from kfsheet.excel.compose import (
+    Page,
+    Run,
+    charts_page,
+    parameters_page,
+    readme_page,
+    section_page,
+)
+from kfsheet.excel.drawing import draw
+from kfsheet.excel.finish import Value, finish, write_file
+from kfsheet.excel.layout import FIRST_ROW, Layout
+from kfsheet.excel.styles import Styles
+from kfsheet.exercise import Exercise
+
+TABS = {"Read me": "1F3864", "Parameters": "FFC000", "Charts": "0072B2", "Check": "70AD47"}
+
+
+def compose(exercise: Exercise, layout: Layout, now: Run, built: Run) -> list[Page]:
+    """Every worksheet, in order, for the run ``now`` of a workbook built from the run ``built``."""
+    sections = [section_page(layout, section, now) for section in exercise.model.sections]
+    return [
+        readme_page(exercise, layout),
+        parameters_page(layout, now),
+        *sections,
+        charts_page(exercise, layout, now),
+        check_page(layout, now, built),
+    ]
+
+
+def workbook_bytes(exercise: Exercise) -> bytes:
+    """The workbook of an exercise; the same bytes for the same exercise."""
+    layout = Layout.standard(exercise.model)
+    now = Run.of(exercise.model)
+    pages = compose(exercise, layout, now, now)
+    book = Workbook()
+    book.remove(book.active)
+    styles = Styles(book)
+    for page in pages:
+        _write_page(book, styles, page)
+    styles.close()
+    _define_names(book, layout, pages)
+    _add_validations(book["Parameters"], layout)
+    _colour_verdict(book["Check"])
+    draw(book, exercise, layout)
+    _describe(book, exercise)
+    saved = BytesIO()
+    book.save(saved)
+    return finish(saved.getvalue(), _stored_values(pages))
+
+
+def write_workbook(exercise: Exercise, path: str | Path) -> Path:
+    """Write the workbook of an exercise.
+
+    Parameters
+    ----------
+    exercise : Exercise
+        What to write.
+    path : path
+        File to write, ending in ``.xlsx``, or a folder, which gets ``NAME.xlsx``.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    WorkbookError
+        If the file cannot be written; nothing half-written stays behind.
+    PrintError
+        If a formula has no equivalent in Excel 2010.
+    """
+    path = Path(path)
+    target = path if path.suffix == ".xlsx" else path / f"{exercise.name}.xlsx"
+    return write_file(target, workbook_bytes(exercise))
+
+
+def _write_page(book: Workbook, styles: Styles, page: Page) -> None:
+    sheet = book.create_sheet(page.title)
+    height = max(row for row, _ in page.pieces)
+    width = max(column for _, column in page.pieces)
+    for row in range(1, height + 1):
+        cells = [page.pieces.get((row, column)) for column in range(1, width + 1)]
+        sheet.append(
+            [p and styles.cell(sheet, p.content, p.kind, p.format, p.align) for p in cells]
+        )
+    for column, size in page.widths.items():
+        sheet.column_dimensions[get_column_letter(column)].width = size
+    for row, size in page.heights.items():
+        sheet.row_dimensions[row].height = size
+    for cells in page.merges:
+        sheet.merge_cells(cells)
+    sheet.freeze_panes = page.freeze or None
+    sheet.sheet_properties.tabColor = TABS.get(page.title, "A6A6A6")
+    sheet.sheet_view.showGridLines = page.title in book.sheetnames and bool(page.freeze)
+    sheet.page_setup.orientation, sheet.page_setup.fitToHeight = "landscape", 0
+    sheet.sheet_properties.pageSetUpPr.fitToPage = True
+    if page.freeze:
+        sheet.print_title_rows = f"1:{FIRST_ROW - 1}"
+
+
+def _define_names(book: Workbook, layout: Layout, pages: list[Page]) -> None:
+    own = {name: (p.title, *cell) for p in pages for name, cell in p.names.items()}
+    for name, (sheet, row, column) in {**layout.scalars, **own}.items():
+        cell = f"{quote_sheetname(sheet)}!${get_column_letter(column)}${row}"
+        book.defined_names[name] = DefinedName(name, attr_text=cell)
+
+
+def _add_validations(sheet: Worksheet, layout: Layout) -> None:
+    """Input messages, and refusal of values that a parameter cannot have."""
+    limits = {"positive": "greaterThan", "nonnegative": "greaterThanOrEqual"}
+    for name, parameter in layout.model.parameters.items():
+        bound = limits.get(parameter.sign)
+        rule = DataValidation(
+            type="decimal",
+            operator=bound or "between",
+            formula1="0" if bound else "-1E+300",
+            formula2=None if bound else "1E+300",
+            showErrorMessage=True,
+            showInputMessage=True,
+            errorTitle=name,
+            error=f"{name} must be a number" + (f", {parameter.bound}" if bound else ""),
+            promptTitle=name,
+            prompt=f"{parameter.description}. At build: {parameter.value:g} {parameter.unit}",
+        )
+        rule.add(f"{get_column_letter(layout.scalars[name][2])}{layout.scalars[name][1]}")
+        sheet.add_data_validation(rule)
+
+
+def _colour_verdict(sheet: Worksheet) -> None:
+    for word, colour in ((PASS, "C6EFCE"), (FAIL, "FFC7CE")):
+        fill = PatternFill("solid", start_color="FF" + colour, end_color="FF" + colour)
+        rule = CellIsRule(operator="equal", formula=[f'"{word}"'], fill=fill, font=Font(bold=True))
+        sheet.conditional_formatting.add("B4", rule)
+
+
+def _describe(book: Workbook, exercise: Exercise) -> None:
+    book.properties.creator, book.properties.title = "kfsheet", exercise.title
+    book.custom_doc_props.append(StringProperty(name="kfsheet exercise", value=exercise.name))
+    book.active = 0
+
+
+def _stored_values(pages: list[Page]) -> dict[str, dict[str, Value]]:
+    """Values of formula cells by part of the zip; openpyxl numbers sheets in order."""
+    return {
+        f"xl/worksheets/sheet{n}.xml": {
+            f"{get_column_letter(column)}{row}": piece.stored
+            for (row, column), piece in page.pieces.items()
+            if is_formula(piece.content)
+        }
+        for n, page in enumerate(pages, 1)
+    }
+
+
+def is_formula(content: object) -> bool:
+    """Whether the content of a cell is a formula."""
+    return isinstance(content, str) and content.startswith("=")
