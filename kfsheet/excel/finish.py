@@ -19,6 +19,8 @@ from kfsheet.errors import WorkbookError
 
 EPOCH = (1980, 1, 1, 0, 0, 0)
 FORMULA = re.compile(r'<c r="([A-Z]+\d+)"([^>]*)><f>(.*?)</f><v ?/?>(?:</v>)?</c>', re.DOTALL)
+# An empty cell that is typed as a number is read as 0 by some programs.
+EMPTY = re.compile(r'(<c r="[A-Z]+\d+"(?: s="\d+")?) t="n"( ?/>)')
 MOMENT = re.compile(r"(<dcterms:(created|modified)[^>]*>)[^<]*(</dcterms:\2>)")
 
 Value = float | int | str | bool | None
@@ -49,7 +51,7 @@ def _with_values(xml: str, values: Mapping[str, Value]) -> str:
         kind, text = _typed(values[address])
         return f'<c r="{address}"{attributes}{kind}><f>{formula}</f><v>{text}</v></c>'
 
-    return FORMULA.sub(cell, xml)
+    return EMPTY.sub(r"\1\2", FORMULA.sub(cell, xml))
 
 
 def _typed(value: Value) -> tuple[str, str]:

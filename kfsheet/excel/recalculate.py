@@ -1,0 +1,186 @@
+"""Recalculate a workbook from nothing in a spreadsheet engine that is not ours.
+
+A file that carries stored values invites an engine to believe them: LibreOffice does. So every
+engine is given a copy whose formulas have no values.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import tempfile
+import warnings
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from xml.etree.ElementTree import ParseError
+
+import openpyxl
+from openpyxl.utils.exceptions import InvalidFileException
+
+from kfsheet.errors import EngineError, WorkbookError
+
+CellValue = float | int | str | bool | None
+Values = dict[str, dict[tuple[int, int], CellValue]]
+"""Value by sheet and (row, column), counted from 1; errors are strings such as '#DIV/0!'."""
+
+TIMEOUT = 300  # seconds, for LibreOffice
+CELL = re.compile(rb"<((?:\w+:)?c)((?:\s[^>]*[^>/])?)>(.*?)</\1>", re.DOTALL)
+VALUE = re.compile(rb"<((?:\w+:)?v)\b[^>]*?(?:/>|>.*?</\1>)", re.DOTALL)
+TYPE = re.compile(rb'\s+t="[^"]*"')
+# openpyxl types an empty cell as a number, and IronCalc then reads a 0: a photo that is not there.
+EMPTY = re.compile(rb'(<(?:\w+:)?c\s[^>]*?)\s+t="n"(\s*/>)')
+HAS_FORMULA = re.compile(rb"<(?:\w+:)?f\b")
+
+
+def recalculate(path: str | Path, engine: str = "ironcalc") -> Values:
+    """Values of all cells of a workbook, computed from nothing by an independent engine.
+
+    Parameters
+    ----------
+    path : path
+        An ``.xlsx`` file; it is not changed.
+    engine : {'ironcalc', 'libreoffice'}
+        IronCalc is embedded; LibreOffice must be installed.
+
+    Returns
+    -------
+    dict
+        ``values[sheet][row, column]`` of every cell that is not empty.
+
+    Raises
+    ------
+    WorkbookError
+        If the file is no workbook.
+    EngineError
+        If the engine is unknown, missing, fails or takes longer than five minutes.
+    """
+    if engine not in ENGINES:
+        raise EngineError(f"no engine {engine!r}; there is {', '.join(ENGINES)}")
+    with tempfile.TemporaryDirectory(prefix="kfsheet-") as folder:
+        copy = Path(folder) / "copy.xlsx"
+        strip_values(path, copy)
+        return ENGINES[engine](copy)
+
+
+def open_workbook(path: str | Path, *, data_only: bool = False) -> openpyxl.Workbook:
+    """Open an ``.xlsx`` file, or say in one line why it is none."""
+    try:
+        with warnings.catch_warnings():
+            # openpyxl warns of parts that it does not keep; we only read.
+            warnings.simplefilter("ignore", UserWarning)
+            return openpyxl.load_workbook(path, data_only=data_only)
+    except OSError as error:
+        raise WorkbookError(f"{path} cannot be read: {error.strerror or error}") from None
+    except (
+        InvalidFileException,
+        zipfile.BadZipFile,
+        ParseError,
+        KeyError,
+        ValueError,
+        TypeError,
+        AttributeError,
+        IndexError,
+    ) as error:
+        detail = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise WorkbookError(f"{path} is not a workbook (.xlsx): {detail}") from None
+
+
+def strip_values(path: str | Path, copy: str | Path) -> None:
+    """Copy a workbook without the stored values of its formulas.
+
+    Raises
+    ------
+    WorkbookError
+        If the file cannot be read or is no workbook.
+    """
+    try:
+        with zipfile.ZipFile(path) as old, zipfile.ZipFile(copy, "w", zipfile.ZIP_DEFLATED) as new:
+            if "xl/workbook.xml" not in old.namelist():
+                raise WorkbookError(f"{path} is not a workbook (.xlsx): it has no xl/workbook.xml")
+            for item in old.infolist():
+                content = old.read(item)
+                if re.fullmatch(r"xl/worksheets/[^/]+\.xml", item.filename):
+                    content = EMPTY.sub(rb"\1\2", CELL.sub(_without_value, content))
+                new.writestr(item.filename, content)
+    except OSError as error:
+        raise WorkbookError(f"{path} cannot be read: {error.strerror or error}") from None
+    except (zipfile.BadZipFile, zipfile.LargeZipFile, EOFError, NotImplementedError) as error:
+        raise WorkbookError(f"{path} is not a workbook (.xlsx): {error}") from None
+
+
+def _without_value(cell: re.Match[bytes]) -> bytes:
+    tag, attributes, inside = cell.groups()
+    if not HAS_FORMULA.search(inside):
+        return cell[0]
+    # An empty value, not none at all: IronCalc reports a formula that lacks the element.
+    emptied = VALUE.sub(rb"<\1></\1>", inside)
+    return b"<%s%s>%s</%s>" % (tag, TYPE.sub(b"", attributes), emptied, tag)
+
+
+def _ironcalc(copy: Path) -> Values:
+    import ironcalc
+
+    try:
+        model = ironcalc.load_from_xlsx(str(copy), "en", "UTC")
+        model.evaluate()
+    except Exception as error:  # IronCalc raises its own kind and, from Rust, PanicException
+        raise EngineError(f"IronCalc cannot calculate the workbook: {error}") from None
+    names = [sheet["name"] for sheet in model.get_worksheets_properties()]
+    values: Values = {name: {} for name in names}
+    for sheet, row, column in model.get_all_cells():
+        values[names[sheet]][row, column] = model.get_cell_value(sheet, row, column)
+    return values
+
+
+def libreoffice() -> str | None:
+    """Path of LibreOffice's command, if it is installed."""
+    return shutil.which("soffice") or shutil.which("libreoffice")
+
+
+def _libreoffice(copy: Path) -> Values:
+    command = libreoffice()
+    if command is None:
+        raise EngineError("LibreOffice is not installed; install it, or use --engine ironcalc")
+    converted = convert(copy, copy.parent / "out", "xlsx:Calc MS Excel 2007 XML")
+    book = open_workbook(converted, data_only=True)
+    return {
+        sheet.title: {
+            (cell.row, cell.column): cell.value
+            for row in sheet.iter_rows()
+            for cell in row
+            if cell.value is not None
+        }
+        for sheet in book.worksheets
+    }
+
+
+def convert(path: Path, folder: Path, kind: str) -> Path:
+    """Convert a workbook with LibreOffice to ``kind`` ("pdf", "xlsx:...") in ``folder``.
+
+    Each call has a profile of its own: two LibreOffices with one profile block each other.
+    """
+    with tempfile.TemporaryDirectory(prefix="kfsheet-profile-") as profile:
+        arguments = [
+            libreoffice(),
+            f"-env:UserInstallation={Path(profile).as_uri()}",
+            "--headless",
+            "--convert-to",
+            kind,
+            "--outdir",
+            str(folder),
+            str(path),
+        ]
+        try:
+            done = subprocess.run(arguments, capture_output=True, text=True, timeout=TIMEOUT)
+        except subprocess.TimeoutExpired:
+            raise EngineError(f"LibreOffice took longer than {TIMEOUT} s") from None
+    result = folder / f"{path.stem}.{kind.partition(':')[0]}"
+    if not result.exists():
+        words = (done.stderr or done.stdout).strip().splitlines() or ["no message"]
+        raise EngineError(f"LibreOffice cannot convert {path.name}: {words[-1]}")
+    return result
+
+
+ENGINES: dict[str, Callable[[Path], Values]] = {"ironcalc": _ironcalc, "libreoffice": _libreoffice}
