@@ -1,0 +1,46 @@
+"""kfsheet: a Kalman filter derived once, evaluated, written as a workbook, checked and taught.
+
+The public names are imported when they are first used, so that ``import kfsheet`` is quick.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "kfsheet.algebra": "analysis correlated_covariance diagonal_analysis gain_limits "
+    "sequential_gain",
+    "kfsheet.charts": "Chart Series",
+    "kfsheet.errors": "DataError EngineError KfsheetError ModelError PrintError WorkbookError",
+    "kfsheet.evaluate": "evaluate",
+    "kfsheet.excel.check": "check_workbook",
+    "kfsheet.excel.printer": "excel_code",
+    "kfsheet.excel.recalculate": "recalculate",
+    "kfsheet.excel.workbook": "write_workbook",
+    "kfsheet.exercise": "Exercise Question",
+    "kfsheet.exercises": "exercise_names load_exercise",
+    "kfsheet.expressions": "Count Largest Last Mean Missing Observed RMS Smallest Std Sum "
+    "SumProduct t when_observed",
+    "kfsheet.latex": "latex_code",
+    "kfsheet.plots": "draw",
+    "kfsheet.pythoncode": "python_code python_source",
+    "kfsheet.recurrence": "Recurrence",
+    "kfsheet.tables": "read_table",
+}
+_HOME = {name: home for home, names in _HOMES.items() for name in names.split()}
+__all__ = sorted([*_HOME, "__version__"])
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'kfsheet' has no attribute {name!r}")
+    value = getattr(import_module(_HOME[name]), name)
+    globals()[name] = value  # the next use does not come here
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

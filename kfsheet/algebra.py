@@ -72,7 +72,7 @@ class Analysis:
 
     @property
     def innovation(self) -> Matrix:
-        """y - H[x_f], m x 1, with the whole of an affine H."""
+        """Y - H[x_f], m x 1, with the whole of an affine H."""
         return self.y - self.c - self.H * self.x_f
 
     @property
@@ -137,7 +137,7 @@ def analysis(
 
 
 def diagonal_analysis(n: int) -> Analysis:
-    """n quantities, each observed by itself: B = diag(b), R = diag(r), H = diag(a).
+    """N quantities, each observed by itself: B = diag(b), R = diag(r), H = diag(a).
 
     Its gain is diag(K) with K_i = b_i a_i / (r_i + a_i^2 b_i): the scalar gain.
     """

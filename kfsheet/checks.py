@@ -5,12 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Set
 from typing import Any
 
-from sympy import Basic, Expr, Float, Indexed, IndexedBase, Piecewise, Rational, Symbol
-from sympy import SympifyError, sympify
+from sympy import (
+    Basic,
+    Expr,
+    Float,
+    Indexed,
+    IndexedBase,
+    Piecewise,
+    Rational,
+    Symbol,
+    SympifyError,
+    sympify,
+)
 from sympy.logic.boolalg import And, Not
 
 from kfsheet.errors import ModelError
-from kfsheet.expressions import Aggregate, Observed, column_references, lag, t
+from kfsheet.expressions import Aggregate, Observed, column_references, lag
 
 LARGEST_NUMBER, LARGEST_DENOMINATOR = 1000, 16
 

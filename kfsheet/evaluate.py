@@ -89,7 +89,9 @@ def _checked_data(model: Recurrence, given: Mapping[str, Any]) -> dict[str, list
     for name, values in given.items():
         series[name] = list(checked_values(name, values, model.table[name].may_be_missing))
         if len(series[name]) != model.rows:
-            raise DataError(f"{name} has {len(series[name])} values; the table has {model.rows} rows")
+            raise DataError(
+                f"{name} has {len(series[name])} values; the table has {model.rows} rows"
+            )
     return series
 
 

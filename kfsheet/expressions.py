@@ -37,7 +37,9 @@ class _Missing(Expr, metaclass=Singleton):
 Missing = _Missing()
 
 
-def when_observed(cells: Indexed | tuple[Indexed, ...], value: Expr, otherwise: Expr = Missing):
+def when_observed(
+    cells: Indexed | tuple[Indexed, ...], value: Expr, otherwise: Expr = Missing
+) -> Piecewise:
     """``value`` where every one of ``cells`` holds a number, else ``otherwise``.
 
     >>> from sympy import IndexedBase

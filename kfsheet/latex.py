@@ -29,7 +29,7 @@ class HumanLatexPrinter(LatexPrinter):
 
 
 def latex_name(name: str, *indices: str) -> str:
-    """``e_x_a`` as e_{x,a}, Greek names as Greek letters.
+    r"""``e_x_a`` as e_{x,a}, Greek names as Greek letters.
 
     >>> latex_name("sigma_theta", "t")
     '\\\\sigma_{\\\\theta,t}'

@@ -30,7 +30,7 @@ class Parameter:
     def checked(self, value: Any, where: str = "") -> float:
         """``value`` as a float, or a DataError that says what the parameter may be."""
         number = as_number(value, f"parameter {self.name}{where}")
-        if self.sign == "positive" and number <= 0 or self.sign == "nonnegative" and number < 0:
+        if (self.sign == "positive" and number <= 0) or (self.sign == "nonnegative" and number < 0):
             raise DataError(
                 f"parameter {self.name}{where} is {number:g}, but {self.description} "
                 f"must be {self.bound}"
@@ -98,7 +98,7 @@ class Column:
 
 def as_number(value: Any, what: str) -> float:
     """``value`` as a finite float; a DataError that names ``what`` otherwise."""
-    if isinstance(value, bool) or isinstance(value, str) or value is None:
+    if isinstance(value, (bool, str)) or value is None:
         raise DataError(f"{what} is {value!r}; it must be a number")
     try:
         number = float(value)
@@ -124,4 +124,4 @@ def checked_values(column: str, values: Iterable[Any], may_be_missing: bool) -> 
 
 
 def _is_missing(value: Any) -> bool:
-    return value is None or isinstance(value, float) and isnan(value)
+    return value is None or (isinstance(value, float) and isnan(value))

@@ -7,7 +7,21 @@ the human order from here, so that a formula looks the same wherever it is read.
 
 from __future__ import annotations
 
-from sympy import Add, Basic, Eq, Expr, Indexed, Integer, Mul, Number, Pow, Rational, S, Symbol, sympify
+from sympy import (
+    Add,
+    Basic,
+    Eq,
+    Expr,
+    Indexed,
+    Integer,
+    Mul,
+    Number,
+    Pow,
+    Rational,
+    S,
+    Symbol,
+    sympify,
+)
 from sympy import functions as sf
 from sympy.core.function import Function, _coeff_isneg
 from sympy.printing.codeprinter import CodePrinter

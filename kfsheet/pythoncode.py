@@ -33,7 +33,7 @@ class PythonPrinter(FormulaPrinter):
             "sqrt exp log sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh "
             "sign floor"
         ).split()
-    } | {"Abs": "abs", "Min": "min", "Max": "max", "ceiling": "ceil", "Observed": "observed"}
+    } | {"Abs": "abs", "Min": "min", "Max": "max", "ceiling": "ceil"}
 
     def _print_Symbol(self, expr: Symbol) -> str:
         return expr.name
@@ -122,7 +122,9 @@ def _head(model: Recurrence) -> list[str]:
     lines = [f"def {model.name}(", f"    {', '.join(data)}," if data else ""]
     lines += ["    *,"] if model.parameters else []
     for p in model.parameters.values():
-        lines.append(f"    {p.name}={p.value!r},  # {p.unit + ': ' if p.unit else ''}{p.description}")
+        lines.append(
+            f"    {p.name}={p.value!r},  # {p.unit + ': ' if p.unit else ''}{p.description}"
+        )
     return [*filter(None, lines), "):", f'    """{model.title}."""']
 
 
@@ -187,7 +189,7 @@ def _return_lines(model: Recurrence) -> list[str]:
     scalars = [*model.derived_scalars, *model.summaries]
     lines = [""]
     for name, keys in (("columns", [c.name for c in model.all_columns()]), ("scalars", scalars)):
-        head, *rest = _wrapped(", ".join(f"{key}={key}" for key in keys))
+        _, *rest = _wrapped(", ".join(f"{key}={key}" for key in keys))
         lines += [f"    {name} = dict(", *rest, "    )"]
     return [*lines, "    return columns, scalars"]
 

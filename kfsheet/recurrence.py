@@ -112,7 +112,9 @@ class Recurrence:
         """Add a scalar made of aggregates of columns, as ``RMS(e_x)``; columns may read it."""
         expression = self._checked(name, expression)
         if column_references(expression) or t in checks.scalars(expression):
-            raise ModelError(f"summary {name} reads single rows; take Last, Mean, RMS, ... of columns")
+            raise ModelError(
+                f"summary {name} reads single rows; take Last, Mean, RMS, ... of columns"
+            )
         return self._add_scalar(self.summaries, name, expression, unit, description)
 
     def data(

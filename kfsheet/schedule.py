@@ -87,7 +87,7 @@ def _circle(name: str, waiting: dict[str, set[str]]) -> list[str]:
     """Follow what each column waits for until a name comes back."""
     path = [name]
     while True:
-        following = min(w for w in waiting[path[-1]] if w in waiting and waiting[w])
+        following = min(w for w in waiting[path[-1]] if waiting.get(w))
         if following in path:
             return [*path[path.index(following) :], following]
         path.append(following)

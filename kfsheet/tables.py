@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 from collections.abc import Collection, Sequence
 from math import nan
 from pathlib import Path
@@ -73,13 +74,15 @@ def _number(text: str, what: str, optional: bool) -> float:
     try:
         return as_number(float(text), what)
     except ValueError as error:
-        raise error if isinstance(error, DataError) else DataError(
-            f"{what} is {text!r}; it must be a number"
+        raise (
+            error
+            if isinstance(error, DataError)
+            else DataError(f"{what} is {text!r}; it must be a number")
         ) from None
 
 
 def _check_times(path: Path, name: str, times: list[float]) -> None:
-    for line, (before, now) in enumerate(zip(times, times[1:], strict=False), start=3):
+    for line, (before, now) in enumerate(itertools.pairwise(times), start=3):
         if now <= before:
             what = "repeats" if now == before else "goes back from"
             raise DataError(

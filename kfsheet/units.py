@@ -8,8 +8,24 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
 
-from sympy import Abs, Add, Basic, Indexed, IndexedBase, Max, Min, Mod, Mul, Number, Piecewise, Pow
-from sympy import atan2, ceiling, floor, sign
+from sympy import (
+    Abs,
+    Add,
+    Basic,
+    Indexed,
+    IndexedBase,
+    Max,
+    Min,
+    Mod,
+    Mul,
+    Number,
+    Piecewise,
+    Pow,
+    atan2,
+    ceiling,
+    floor,
+    sign,
+)
 from sympy.core.numbers import NumberSymbol
 from sympy.core.relational import Relational
 from sympy.logic.boolalg import Boolean
@@ -72,7 +88,7 @@ class UnitProblem:
         return f"{self.name}: {self.reason}"
 
 
-class _Disagreement(Exception):
+class _DisagreementError(Exception):
     """Carries the reason up from the node where two units meet."""
 
 
@@ -92,7 +108,7 @@ class UnitWalker:
         """Why ``expression`` is not in ``unit``; None if it is."""
         try:
             found = self.of(expression)
-        except _Disagreement as disagreement:
+        except _DisagreementError as disagreement:
             return str(disagreement)
         if found is None or self.same(found, parse_unit(unit)):
             return None
@@ -148,7 +164,7 @@ class UnitWalker:
     def _power(self, e: Pow) -> Quantity | None:
         self._dimensionless(e.exp, "an exponent")
         base = self.of(e.base)
-        if base is None or base.unitless and self.same(base, self.none):
+        if base is None or (base.unitless and self.same(base, self.none)):
             return base
         exponent = e.exp.subs({s: self.values[s.name] for s in e.exp.free_symbols})
         return base ** float(exponent)
@@ -167,7 +183,7 @@ class UnitWalker:
         for term, unit in known[1:]:
             if not self.same(unit, known[0][1]):
                 (first, one), (second, two) = known[0], (term, unit)
-                raise _Disagreement(
+                raise _DisagreementError(
                     f"{python_code(first)} is in {show(one)} "
                     f"but {python_code(second)} is in {show(two)}"
                 )
@@ -176,7 +192,9 @@ class UnitWalker:
     def _dimensionless(self, e: Basic, what: str) -> None:
         unit = self.of(e)
         if unit is not None and not self.same(unit, self.none):
-            raise _Disagreement(f"{what}, {python_code(e)}, is in {show(unit)}; it must be a number")
+            raise _DisagreementError(
+                f"{what}, {python_code(e)}, is in {show(unit)}; it must be a number"
+            )
 
     @staticmethod
     def same(one: Quantity, two: Quantity) -> bool:

@@ -1,0 +1,1 @@
+"""Workbooks: written, recalculated by others, checked."""

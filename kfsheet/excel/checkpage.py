@@ -111,11 +111,13 @@ def _put_probe(page: Page, row: int, probe: Probe) -> None:
     shape = number_format([probe.built])
     for n, word in enumerate((probe.name, probe.what, probe.quantity), 1):
         page.put(row, n, word, "index")
-    page.put(row, 4, probe.formula, "formula", stored=stored(probe.now), format=shape)
+    now = stored(probe.now)
+    page.put(row, 4, probe.formula, "formula", stored=now, format=shape, scale=probe.scale)
     page.put(row, 5, probe.built, "data", format=shape)
     page.put(row, 6, probe.scale, "data", format=shape)
     text = f"=ABS(D{row}-E{row})/F{row}"
-    page.put(row, 7, text, "formula", stored=stored(probe.difference), format="0.0E+00")
+    far = stored(probe.difference)
+    page.put(row, 7, text, "formula", stored=far, format="0.0E+00", scale=1.0)
 
 
 def _put_verdict(page: Page, lines: list[Probe]) -> None:
@@ -139,7 +141,7 @@ def _put_verdict(page: Page, lines: list[Probe]) -> None:
         page.put(row, 1, name, "index")
         kind = "formula" if isinstance(content, str) else "data"
         shape = "0.0E+00" if row in (5, 6) else "0"
-        page.put(row, 2, content, kind, stored=value, format=shape)
+        page.put(row, 2, content, kind, stored=value, format=shape, scale=1.0)
     page.names["kfsheet_verdict"] = (4, 2)
 
 

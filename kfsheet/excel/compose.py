@@ -6,18 +6,22 @@ The same composition is what :mod:`kfsheet.excel.workbook` writes and what
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isnan
 from typing import Any, NamedTuple
 
 from openpyxl.utils import get_column_letter
 
+from kfsheet.checks import columns_read
 from kfsheet.evaluate import run
 from kfsheet.excel.layout import FIRST_ROW, PARAMETER_ROW, Layout, quote
 from kfsheet.excel.styles import LEGEND, number_format
 from kfsheet.exercise import Exercise
 from kfsheet.expressions import Missing
+from kfsheet.numerics import rms
 from kfsheet.parts import Column
+from kfsheet.recurrence import Recurrence
 from kfsheet.units import pretty_unit
 
 NOT_AVAILABLE = "#N/A"
@@ -31,6 +35,8 @@ class Piece(NamedTuple):
     stored: Any = None
     format: str = ""
     align: str = ""
+    scale: float = 0.0
+    """What a difference is measured against where the value itself is smaller."""
 
 
 @dataclass
@@ -58,7 +64,12 @@ class Run:
     scalars: dict[str, float]
 
     @classmethod
-    def of(cls, model, data=None, parameters=None) -> Run:
+    def of(
+        cls,
+        model: Recurrence,
+        data: Mapping[str, Sequence[float]] | None = None,
+        parameters: Mapping[str, float] | None = None,
+    ) -> Run:
         """Evaluate a model once."""
         columns, scalars, values = run(model, data, parameters)
         return cls(columns, {**values, **scalars})
@@ -105,14 +116,14 @@ def _data_column(page: Page, column: Column, at: int, now: Run) -> None:
 def _formula_column(page: Page, layout: Layout, column: Column, at: int, now: Run) -> None:
     _head(page, at, column.name, column.unit, column.description)
     values = now.columns[column.name]
-    shape = number_format(values)
+    shape, size = number_format(values), rms(values)
     kind = "index" if column is layout.model.clock else "formula"
     rules = [(rule, layout.formula(rule, page.title)) for rule in column.rules]
     for row, value in enumerate(values):
         rule, text = rules[min(row, len(column.start))]
         # A start without a value is an empty cell, not a formula that says so.
         content = None if rule is Missing else text(FIRST_ROW + row)
-        page.pieces[FIRST_ROW + row, at] = Piece(content, kind, stored(value), shape)
+        page.put(FIRST_ROW + row, at, content, kind, stored=stored(value), format=shape, scale=size)
 
 
 def parameters_page(layout: Layout, now: Run) -> Page:
@@ -134,8 +145,11 @@ def parameters_page(layout: Layout, now: Run) -> Page:
         sheet, row, column = layout.scalars[name]
         value = now.scalars[name]
         text = layout.formula(scalar.expression, sheet)(row)
-        shape = number_format([value])
-        _line(page, row, column, scalar, Piece(text, "formula", stored(value), shape))
+        sizes = [rms(now.columns[c]) for c in columns_read(scalar.expression)]
+        piece = Piece(
+            text, "formula", stored(value), number_format([value]), "", max(sizes, default=0)
+        )
+        _line(page, row, column, scalar, piece)
     return page
 
 
@@ -180,11 +194,12 @@ def charts_page(exercise: Exercise, layout: Layout, now: Run) -> Page:
         _head(page, at, name, column.unit, f"{name} for the charts: #N/A leaves a gap")
         sheet, number = layout.home(name)
         letter, values = get_column_letter(number), now.columns[name]
+        shape = number_format(values)
         for row, value in enumerate(values, FIRST_ROW):
             cell = f"{quote(sheet)}!{letter}{row}"
             text = f"=IF(ISNUMBER({cell}),{cell},NA())"
-            shape = number_format(values)
-            page.put(row, at, text, "formula", stored=stored(value, NOT_AVAILABLE), format=shape)
+            shown = stored(value, NOT_AVAILABLE)
+            page.put(row, at, text, "formula", stored=shown, format=shape, scale=rms(values))
     return page
 
 

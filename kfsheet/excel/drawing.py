@@ -57,9 +57,7 @@ def _hide_from_legend(native: ScatterChart, indices: list[int]) -> None:
     native.legend.legendEntry = [LegendEntry(idx=n, delete=True) for n in indices]
 
 
-def _series(
-    book: Workbook, exercise: Exercise, layout: Layout, series: Series
-) -> NativeSeries:
+def _series(book: Workbook, exercise: Exercise, layout: Layout, series: Series) -> NativeSeries:
     x, y = (_reference(book, exercise, layout, name) for name in (series.x, series.y))
     native = NativeSeries(y, x, title=series.label or series.y)
     look = LOOKS[series.role]
@@ -88,4 +86,3 @@ def _reference(book: Workbook, exercise: Exercise, layout: Layout, name: str) ->
     return Reference(
         book[sheet], min_col=column, min_row=FIRST_ROW, max_row=layout.last_row, max_col=column
     )
-

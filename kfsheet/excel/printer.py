@@ -90,7 +90,7 @@ class ExcelPrinter(FormulaPrinter):
 
     def _negated(self, size: Expr) -> str:
         text = super()._negated(size)
-        return f"-({text[1:]})" if "^" in text and not text.startswith("-(") else text
+        return f"-({text[1:]})" if _begins_with_power(text[1:]) else text
 
     def _print_Min(self, expr: Expr) -> str:
         return self._call(self.functions[type(expr).__name__], *expr.args)
@@ -133,6 +133,17 @@ class ExcelPrinter(FormulaPrinter):
         if name == "Last":
             return self._print_Indexed(expr)
         return AGGREGATES[name].format(*map(self._print, expr.args))
+
+
+def _begins_with_power(text: str) -> bool:
+    """Whether the first factor of a product is a power: a minus before it would take its base."""
+    depth, quoted = 0, False
+    for character in text:
+        quoted ^= character == "'"
+        depth += (character == "(") - (character == ")")
+        if depth == 0 and not quoted and character in "*/^":
+            return character == "^"
+    return False
 
 
 def _in_order(expr: Basic) -> list[Basic]:

@@ -17,6 +17,8 @@ from pathlib import Path
 from xml.etree.ElementTree import ParseError
 
 import openpyxl
+from defusedxml import ElementTree
+from openpyxl.utils import get_column_letter
 from openpyxl.utils.exceptions import InvalidFileException
 
 from kfsheet.errors import EngineError, WorkbookError
@@ -31,10 +33,19 @@ VALUE = re.compile(rb"<((?:\w+:)?v)\b[^>]*?(?:/>|>.*?</\1>)", re.DOTALL)
 TYPE = re.compile(rb'\s+t="[^"]*"')
 # openpyxl types an empty cell as a number, and IronCalc then reads a 0: a photo that is not there.
 EMPTY = re.compile(rb'(<(?:\w+:)?c\s[^>]*?)\s+t="n"(\s*/>)')
+ADDRESS = re.compile(rb'\sr="([A-Z]+\d+)"')
+MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
+LINKS = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
 HAS_FORMULA = re.compile(rb"<(?:\w+:)?f\b")
 
 
-def recalculate(path: str | Path, engine: str = "ironcalc") -> Values:
+Changes = dict[str, dict[tuple[int, int], float]]
+"""Numbers to put into cells before calculating, by sheet and (row, column)."""
+
+
+def recalculate(
+    path: str | Path, engine: str = "ironcalc", changes: Changes | None = None
+) -> Values:
     """Values of all cells of a workbook, computed from nothing by an independent engine.
 
     Parameters
@@ -43,6 +54,8 @@ def recalculate(path: str | Path, engine: str = "ironcalc") -> Values:
         An ``.xlsx`` file; it is not changed.
     engine : {'ironcalc', 'libreoffice'}
         IronCalc is embedded; LibreOffice must be installed.
+    changes : dict, optional
+        Numbers that replace the content of cells before the calculation.
 
     Returns
     -------
@@ -60,7 +73,7 @@ def recalculate(path: str | Path, engine: str = "ironcalc") -> Values:
         raise EngineError(f"no engine {engine!r}; there is {', '.join(ENGINES)}")
     with tempfile.TemporaryDirectory(prefix="kfsheet-") as folder:
         copy = Path(folder) / "copy.xlsx"
-        strip_values(path, copy)
+        strip_values(path, copy, changes)
         return ENGINES[engine](copy)
 
 
@@ -87,8 +100,8 @@ def open_workbook(path: str | Path, *, data_only: bool = False) -> openpyxl.Work
         raise WorkbookError(f"{path} is not a workbook (.xlsx): {detail}") from None
 
 
-def strip_values(path: str | Path, copy: str | Path) -> None:
-    """Copy a workbook without the stored values of its formulas.
+def strip_values(path: str | Path, copy: str | Path, changes: Changes | None = None) -> None:
+    """Copy a workbook without the stored values of its formulas, and with ``changes`` put in.
 
     Raises
     ------
@@ -97,26 +110,46 @@ def strip_values(path: str | Path, copy: str | Path) -> None:
     """
     try:
         with zipfile.ZipFile(path) as old, zipfile.ZipFile(copy, "w", zipfile.ZIP_DEFLATED) as new:
-            if "xl/workbook.xml" not in old.namelist():
-                raise WorkbookError(f"{path} is not a workbook (.xlsx): it has no xl/workbook.xml")
+            new_numbers = {_parts(old)[sheet]: cells for sheet, cells in (changes or {}).items()}
             for item in old.infolist():
                 content = old.read(item)
                 if re.fullmatch(r"xl/worksheets/[^/]+\.xml", item.filename):
-                    content = EMPTY.sub(rb"\1\2", CELL.sub(_without_value, content))
+                    content = _strip(content, new_numbers.get(item.filename, {}))
                 new.writestr(item.filename, content)
     except OSError as error:
         raise WorkbookError(f"{path} cannot be read: {error.strerror or error}") from None
-    except (zipfile.BadZipFile, zipfile.LargeZipFile, EOFError, NotImplementedError) as error:
+    except (zipfile.BadZipFile, zipfile.LargeZipFile, EOFError, KeyError, ParseError) as error:
         raise WorkbookError(f"{path} is not a workbook (.xlsx): {error}") from None
 
 
-def _without_value(cell: re.Match[bytes]) -> bytes:
-    tag, attributes, inside = cell.groups()
-    if not HAS_FORMULA.search(inside):
-        return cell[0]
-    # An empty value, not none at all: IronCalc reports a formula that lacks the element.
-    emptied = VALUE.sub(rb"<\1></\1>", inside)
-    return b"<%s%s>%s</%s>" % (tag, TYPE.sub(b"", attributes), emptied, tag)
+def _parts(archive: zipfile.ZipFile) -> dict[str, str]:
+    """Name inside the zip of every worksheet, by title."""
+    links = ElementTree.fromstring(archive.read("xl/_rels/workbook.xml.rels"))
+    targets = {link.get("Id"): link.get("Target", "") for link in links}
+    sheets = ElementTree.fromstring(archive.read("xl/workbook.xml")).iter(f"{{{MAIN}}}sheet")
+    homes = {sheet.get("name"): targets[sheet.get(f"{{{LINKS}}}id")] for sheet in sheets}
+    return {
+        title: home.lstrip("/") if home.startswith("/") else f"xl/{home}"
+        for title, home in homes.items()
+    }
+
+
+def _strip(xml: bytes, numbers: dict[tuple[int, int], float]) -> bytes:
+    new = {f"{get_column_letter(c)}{r}".encode(): repr(v) for (r, c), v in numbers.items()}
+
+    def cell(match: re.Match[bytes]) -> bytes:
+        tag, attributes, inside = match.groups()
+        address = ADDRESS.search(attributes)
+        if address and address[1] in new:
+            value = new[address[1]].encode()
+            return b"<%s%s><v>%s</v></%s>" % (tag, TYPE.sub(b"", attributes), value, tag)
+        if not HAS_FORMULA.search(inside):
+            return match[0]
+        # An empty value, not none at all: IronCalc reports a formula that lacks the element.
+        emptied = VALUE.sub(rb"<\1></\1>", inside)
+        return b"<%s%s>%s</%s>" % (tag, TYPE.sub(b"", attributes), emptied, tag)
+
+    return EMPTY.sub(rb"\1\2", CELL.sub(cell, xml))
 
 
 def _ironcalc(copy: Path) -> Values:

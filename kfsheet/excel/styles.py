@@ -8,6 +8,7 @@ from math import floor, isfinite, log10, sqrt
 from openpyxl import Workbook
 from openpyxl.cell import Cell
 from openpyxl.styles import Alignment, Border, Font, PatternFill, Side
+from openpyxl.worksheet.worksheet import Worksheet
 
 DARK, LINE = "1F3864", "BFBFBF"
 KINDS = {
@@ -41,10 +42,12 @@ class Styles:
         self._known: dict[tuple[str, str, str], object] = {}
 
     @cached_property
-    def _scratch(self):
-        return Workbook.create_sheet(self.book, "scratch")
+    def _scratch(self) -> Worksheet:
+        return self.book.create_sheet("scratch")
 
-    def cell(self, sheet, content: object, kind: str, number_format: str = "", align: str = ""):
+    def cell(
+        self, sheet: Worksheet, content: object, kind: str, number_format: str = "", align: str = ""
+    ) -> Cell:
         """A new cell of ``kind`` for ``sheet.append``."""
         key = (kind, number_format, align)
         if key not in self._known:

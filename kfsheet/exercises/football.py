@@ -66,7 +66,9 @@ def build_model(
 
     m.time(t * dt, "s", "time since the kick")
     page = "Reanalysis"
-    i = m.data("i", photos["i"], "px", "photo, pixels to the right", section=page, may_be_missing=True)
+    i = m.data(
+        "i", photos["i"], "px", "photo, pixels to the right", section=page, may_be_missing=True
+    )
     j = m.data("j", photos["j"], "px", "photo, pixels down", section=page, may_be_missing=True)
     u, w, x_f, z_f, d_i, d_j, x_a, z_a = m.columns(
         "u", "w", "x_f", "z_f", "d_i", "d_j", "x_a", "z_a", section=page

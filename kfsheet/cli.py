@@ -1,0 +1,178 @@
+"""The command line: ``kfsheet build | check | show``."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
+
+from kfsheet.errors import KfsheetError, ModelError
+
+if TYPE_CHECKING:
+    from kfsheet.excel.check import Report
+
+HOLDS, DOES_NOT_HOLD, WRONG_USE = 0, 1, 2
+MOST_PROBLEMS = 20
+ENGINE_NAMES = {"ironcalc": "IronCalc", "libreoffice": "LibreOffice"}
+
+
+class Parser(argparse.ArgumentParser):
+    """Tells a wrong call in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print one line and leave with status 2."""
+        self.exit(WRONG_USE, f"{self.prog}: {message}; see {self.prog} --help\n")
+
+
+def parser() -> Parser:
+    """The arguments of every command."""
+    top = Parser(
+        prog="kfsheet",
+        description="Kalman filters derived once, and written as workbooks of live formulas.",
+    )
+    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    exercise = "name of an exercise, or the path of a Python file that defines one"
+
+    build = commands.add_parser("build", help="write workbooks")
+    build.add_argument(
+        "exercises", nargs="*", metavar="EXERCISE", help=f"{exercise} (default: all)"
+    )
+    build.add_argument(
+        "--out", default="workbooks", metavar="DIR", help="folder (default: workbooks)"
+    )
+    build.set_defaults(run=run_build)
+
+    check = commands.add_parser(
+        "check", help="recalculate workbooks from nothing and compare them with NumPy"
+    )
+    check.add_argument("workbooks", nargs="+", metavar="WORKBOOK")
+    check.add_argument("--engine", choices=list(ENGINE_NAMES), default="ironcalc")
+    check.add_argument(
+        "--exercise",
+        metavar="FILE.py",
+        help="the file that defines the exercise, for workbooks of your own",
+    )
+    check.set_defaults(run=run_check)
+
+    show = commands.add_parser("show", help="print a model in another dress")
+    show.add_argument("exercise", metavar="EXERCISE", help=exercise)
+    show.add_argument(
+        "--as", dest="dress", choices=["python", "latex", "excel", "table"], default="table"
+    )
+    show.set_defaults(run=run_show)
+    return top
+
+
+def run_build(arguments: argparse.Namespace) -> int:
+    """Write workbooks."""
+    from kfsheet.excel.workbook import write_workbook
+    from kfsheet.exercises import exercise_names, load_exercise
+
+    exercises = [load_exercise(spec) for spec in arguments.exercises or exercise_names()]
+    written = []
+    for exercise in progress(exercises, "build", [e.name for e in exercises]):
+        written.append(write_workbook(exercise, Path(arguments.out)))
+    for path in written:
+        print(path)
+    return HOLDS
+
+
+def run_check(arguments: argparse.Namespace) -> int:
+    """Check workbooks; one that cannot be checked does not keep the others from it."""
+    status = HOLDS
+    for path in progress(arguments.workbooks, "check", arguments.workbooks):
+        try:
+            status = max(status, _check_one(Path(path), arguments))
+        except KfsheetError as error:
+            complain(error)
+            status = WRONG_USE
+    return status
+
+
+def _check_one(path: Path, arguments: argparse.Namespace) -> int:
+    from kfsheet.excel.check import check_workbook
+    from kfsheet.excel.reading import exercise_name
+    from kfsheet.excel.recalculate import open_workbook
+    from kfsheet.exercises import exercise_names, load_exercise
+
+    name = exercise_name(open_workbook(path), path)
+    exercise = load_exercise(arguments.exercise) if arguments.exercise else None
+    if exercise is None and name not in exercise_names():
+        raise ModelError(
+            f"{path} was built from {name!r}, which is not one of ours; "
+            f"name its file: kfsheet check {path} --exercise {name}.py"
+        )
+    exercise = exercise or load_exercise(name)
+    if exercise.name != name:
+        raise ModelError(f"{path} was built from {name!r}, not from {exercise.name!r}")
+    report = check_workbook(path, exercise, arguments.engine)
+    for change in report.changed:
+        print(f"{path}: changed: {change}")
+    for problem in report.problems[:MOST_PROBLEMS]:
+        print(f"{path}: {problem}")
+    if len(report.problems) > MOST_PROBLEMS:
+        print(f"{path}: ... and {len(report.problems) - MOST_PROBLEMS} more")
+    print(f"{path}: {_verdict(report)}")
+    return HOLDS if report.holds else DOES_NOT_HOLD
+
+
+def _verdict(report: Report) -> str:
+    engine = ENGINE_NAMES[report.engine]
+    if report.holds:
+        return (
+            f"{report.cells} formulas agree with NumPy in {engine} "
+            f"(largest relative difference {report.largest:.1e})"
+        )
+    wrong = len(report.problems)
+    cells = f"{wrong} cell{'s are' if wrong > 1 else ' is'} wrong in {engine}"
+    return cells + (f", {report.followers} more follow from that" if report.followers else "")
+
+
+def run_show(arguments: argparse.Namespace) -> int:
+    """Print a model."""
+    from kfsheet.exercises import load_exercise
+    from kfsheet.show import DRESSES
+
+    print(DRESSES[arguments.dress](load_exercise(arguments.exercise).model))
+    return HOLDS
+
+
+def progress(items: Iterable, verb: str, names: list[str]) -> Iterator:
+    """Yield items behind a progress bar on a terminal, plain lines elsewhere."""
+    if sys.stderr.isatty():
+        from tqdm import tqdm
+
+        yield from tqdm(items, desc=verb, total=len(names), leave=False)
+        return
+    for n, (item, name) in enumerate(zip(items, names, strict=True), 1):
+        print(f"{verb} {n}/{len(names)}: {name}", file=sys.stderr)
+        yield item
+
+
+def complain(error: Exception) -> None:
+    """One line on standard error."""
+    words = " ".join(str(error).split())
+    print(f"kfsheet: {words}", file=sys.stderr)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command line and return the exit status: 0, 1 "it does not hold", 2 wrong use."""
+    try:
+        chosen = parser().parse_args(arguments)
+        return chosen.run(chosen)
+    except KfsheetError as error:
+        complain(error)
+    except KeyboardInterrupt:
+        complain(RuntimeError("interrupted; nothing half-written was left"))
+    except BrokenPipeError:
+        # The reader of our output has gone, as `head` does; nothing is left to say.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return HOLDS
+    except Exception as error:  # a defect of ours: one line, and the traceback on request
+        if os.environ.get("KFSHEET_DEBUG"):
+            raise
+        complain(RuntimeError(f"{type(error).__name__}: {error}; set KFSHEET_DEBUG=1 for more"))
+    return WRONG_USE

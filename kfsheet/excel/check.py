@@ -1,0 +1,150 @@
+"""Does a workbook compute what NumPy computes, from the parameters and data that stand in it?
+
+The file is recalculated from nothing, twice: as it stands, and with every parameter and datum
+moved by about one percent. The second time finds a number typed over a formula, or a parameter's
+value typed into one, even while it is still right.
+
+What "agrees" means, and how the cell that is wrong is told from those that follow from it, stands
+in :mod:`kfsheet.excel.compare`.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from kfsheet.errors import DataError
+from kfsheet.excel.compare import Comparison
+from kfsheet.excel.compose import Run
+from kfsheet.excel.layout import Address
+from kfsheet.excel.reading import Inputs, layout_of, place
+from kfsheet.excel.recalculate import Changes, open_workbook, recalculate
+from kfsheet.excel.workbook import compose
+from kfsheet.exercise import Exercise
+
+TOLERANCES = {"ironcalc": 1e-12, "libreoffice": 1e-11}
+NUDGE = 0.01
+GOLDEN = (math.sqrt(5) - 1) / 2
+
+Data = dict[str, list[float | None]]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One cell that is wrong in itself, and why."""
+
+    address: Address
+    reason: str
+
+    def __str__(self) -> str:
+        return f"{place(self.address)}: {self.reason}"
+
+
+@dataclass
+class Report:
+    """What a check found."""
+
+    path: Path
+    engine: str
+    cells: int
+    largest: float
+    """Largest relative difference, by the rule above, with the inputs as they stand."""
+    changed: list[str]
+    problems: list[Problem]
+    followers: int
+    """How many more cells differ only because they follow from one that is wrong."""
+
+    @property
+    def holds(self) -> bool:
+        """Whether every formula cell agrees."""
+        return not self.problems
+
+
+def check_workbook(path: str | Path, exercise: Exercise, engine: str = "ironcalc") -> Report:
+    """Recalculate a workbook from nothing and compare every formula cell with NumPy.
+
+    Parameters
+    ----------
+    path : path
+        A workbook built from ``exercise``; parameters, photos and other data may be changed, and
+        columns inserted.
+    exercise : Exercise
+        The exercise that it was built from.
+    engine : {'ironcalc', 'libreoffice'}
+        Who recalculates.
+
+    Raises
+    ------
+    WorkbookError
+        If the file is no workbook, not one of ours, or lost a sheet, a column or a name.
+    DataError
+        If a parameter or datum in it is not allowed, or the model has no value for them.
+    EngineError
+        If the engine cannot do its work.
+    """
+    path = Path(path)
+    book = open_workbook(path)
+    layout = layout_of(book, exercise, path)
+    built = Run.of(exercise.model)
+    values = recalculate(path, engine)
+    inputs = Inputs(book, layout, values, path)
+
+    def compare(values: Values, data: Data, parameters: dict[str, float]) -> Comparison:
+        now = Run.of(exercise.model, data, parameters)
+        comparison = Comparison(book, layout, values, TOLERANCES[engine])
+        comparison.run(compose(exercise, layout, now, built))
+        return comparison
+
+    first = compare(values, inputs.data, inputs.parameters)
+    found, differing = first.problems, set(first.differing)
+    changes, data, parameters = _nudged(inputs)
+    try:
+        second = compare(recalculate(path, engine, changes), data, parameters)
+        moved = {a: f"{reason} (inputs moved by 1 %)" for a, reason in second.problems.items()}
+        found, differing = {**moved, **found}, differing | set(second.differing)
+    except DataError:
+        pass  # the model has no value one percent away; the first comparison has to do
+    return Report(
+        path,
+        engine,
+        first.cells,
+        first.largest,
+        list(_changed(inputs, built)),
+        [Problem(address, found[address]) for address in sorted(found)],
+        len(differing - set(found)),
+    )
+
+
+def _changed(inputs: Inputs, built: Run) -> Iterator[str]:
+    """What a user has changed since the workbook was built, in words."""
+    for name, value in inputs.parameters.items():
+        if value != built.scalars[name]:
+            yield f"{name} {built.scalars[name]:g} -> {value:g}"
+    for name, series in inputs.data.items():
+        before = [None if math.isnan(value) else value for value in built.columns[name]]
+        if count := sum(a != b for a, b in zip(series, before, strict=True)):
+            yield f"{count} value{'s' * (count > 1)} of {name}"
+
+
+def _nudged(inputs: Inputs) -> tuple[Changes, Data, dict[str, float]]:
+    """Every input a little larger, each by another factor, so that no change hides another."""
+    changes: Changes = {}
+    factors = (1 + NUDGE * (0.5 + (n * GOLDEN) % 1) for n in itertools.count(1))
+
+    def move(value: float, address: Address) -> float:
+        moved = value * next(factors) if value else NUDGE
+        changes.setdefault(address[0], {})[address[1:]] = moved
+        return moved
+
+    parameters = {n: move(v, inputs.layout.scalars[n]) for n, v in inputs.parameters.items()}
+    data = {
+        name: [
+            None if value is None else move(value, cell)
+            for value, cell in zip(series, inputs.cells(name), strict=True)
+        ]
+        for name, series in inputs.data.items()
+    }
+    return changes, data, parameters

@@ -1,0 +1,164 @@
+"""Expected cells beside an engine's values: which differ, and which of those are to blame.
+
+The rule: a cell agrees if
+
+    |sheet - NumPy| <= tolerance * max(|NumPy|, root mean square of its column)
+
+so that a value that is small because two numbers cancelled is not asked for more figures than
+those numbers have. The tolerance is 1e-12 for IronCalc and 1e-11 for LibreOffice, which stores 15
+digits.
+
+A wrong cell makes those that follow wrong too. Each cell that disagrees is therefore computed once
+more from the *engine's own* values of its inputs: where that agrees, the cell only follows.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import Any
+
+from openpyxl import Workbook
+
+from kfsheet import numerics
+from kfsheet.excel.compose import Page, Piece
+from kfsheet.excel.layout import FIRST_ROW, Address, Layout
+from kfsheet.excel.recalculate import Values
+from kfsheet.excel.workbook import is_formula
+from kfsheet.pythoncode import python_code
+
+
+class Comparison:
+    """Expected pieces beside an engine's values, and who is to blame for a difference."""
+
+    def __init__(self, book: Workbook, layout: Layout, values: Values, tolerance: float) -> None:
+        self.book, self.layout, self.values, self.tolerance = book, layout, values, tolerance
+        self.cells, self.largest = 0, 0.0
+        self.differing: dict[Address, Piece] = {}
+        self.problems: dict[Address, str] = {}
+
+    def run(self, pages: list[Page]) -> None:
+        """Compare every formula cell, then look for the culprits among those that differ."""
+        for page in pages:
+            for (row, column), piece in page.pieces.items():
+                self._compare((page.title, row, column), piece)
+        homes = self._homes()
+        blind = []
+        for address, piece in self.differing.items():
+            if address in self.problems:
+                continue
+            if address in homes:
+                self._judge(address, piece, *homes[address])
+            else:
+                blind.append((address, piece))
+        for address, piece in blind:
+            if self._text(address) != _plain(piece.content) or not self.problems:
+                self.problems[address] = self._words(piece.stored, address)
+
+    def _compare(self, address: Address, piece: Piece) -> None:
+        sheet, row, column = address
+        content = self.book[sheet].cell(row, column).value if sheet in self.book else None
+        if is_formula(piece.content):
+            self.cells += 1
+            if not is_formula(content):
+                found = "is empty" if content is None else f"holds {content!r}"
+                self.problems[address] = f"{found} where a formula belongs"
+            if not self._agree(piece.stored, self.value(address), piece.scale):
+                self.differing[address] = piece
+        elif piece.kind in ("formula", "index") and piece.content is None and content is not None:
+            self.problems[address] = f"holds {content!r}; there is no value in this row"
+        elif isinstance(piece.content, int) and piece.kind == "index" and content != piece.content:
+            self.problems[address] = f"holds {content!r}, not the step index {piece.content}"
+
+    def value(self, address: Address) -> Any:
+        """What the engine found in a cell."""
+        sheet, row, column = address
+        return self.values.get(sheet, {}).get((row, column))
+
+    def _agree(self, expected: Any, found: Any, scale: float, keep: bool = True) -> bool:
+        if isinstance(expected, str) or expected is None:
+            return (_no_number(expected) and _no_number(found)) or expected == found
+        if not isinstance(found, int | float) or isinstance(found, bool):
+            return False
+        size = max(abs(expected), 0 if math.isnan(scale) else scale) or 1.0
+        difference = abs(found - expected) / size
+        if keep:
+            self.largest = max(self.largest, difference)
+        return difference <= self.tolerance
+
+    # -- culprits --------------------------------------------------------------------------
+
+    def _homes(self) -> dict[Address, tuple[Any, int]]:
+        """The definition and row behind each formula cell of the model."""
+        layout, model = self.layout, self.layout.model
+        homes: dict[Address, tuple[Any, int]] = {}
+        for column in model.all_columns():
+            for sheet, those in layout.columns.items():
+                if column.name in those and not column.is_data:
+                    for row in range(model.rows):
+                        cell = (sheet, FIRST_ROW + row, those[column.name])
+                        homes[cell] = (column.definition(row), row)
+        for name, scalar in {**model.derived_scalars, **model.summaries}.items():
+            homes[layout.scalars[name]] = (scalar.expression, 0)
+        return homes
+
+    def _judge(self, address: Address, piece: Piece, rule: Any, row: int) -> None:
+        """Compute one cell from the engine's values of its inputs; if it differs, it is wrong."""
+        try:
+            local = eval(python_code(rule), {**self._namespace, "t": row})  # our own source
+        except (ArithmeticError, ValueError):
+            local = math.nan
+        expected = "" if isinstance(local, float) and math.isnan(local) else local
+        if not self._agree(expected, self.value(address), piece.scale, keep=False):
+            self.problems[address] = self._words(expected, address)
+
+    @cached_property
+    def _namespace(self) -> dict[str, Any]:
+        """The engine's values by the names that generated source uses."""
+        names: dict[str, Any] = {**vars(math), **vars(numerics)}
+        for name, address in self.layout.scalars.items():
+            names[name] = _number(self.value(address))
+        rows = range(FIRST_ROW, FIRST_ROW + self.layout.model.rows)
+        for sheet, those in self.layout.columns.items():
+            for name, column in those.items():
+                if name != "t":
+                    names[name] = [_number(self.value((sheet, row, column))) for row in rows]
+        return names
+
+    def _text(self, address: Address) -> str:
+        sheet, row, column = address
+        return _plain(self.book[sheet].cell(row, column).value if sheet in self.book else None)
+
+    def _words(self, expected: Any, address: Address) -> str:
+        found = self.value(address)
+        return f"{self.layout_name(address)}the sheet has {_show(found)}, NumPy {_show(expected)}"
+
+    def layout_name(self, address: Address) -> str:
+        """Name and step of a cell, for a message: 'x_f, photo 5: '."""
+        sheet, row, column = address
+        model = self.layout.model
+        for name, number in self.layout.columns.get(sheet, {}).items():
+            if number == column:
+                return f"{name}, {model.step} {row - FIRST_ROW}: "
+        names = (name for name, cell in self.layout.scalars.items() if cell == address)
+        return next((f"{name}: " for name in names), "")
+
+
+def _plain(content: Any) -> str:
+    return str(content).upper().replace(" ", "").replace("$", "")
+
+
+def _number(value: Any) -> float:
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return value if number else math.nan
+
+
+def _no_number(value: Any) -> bool:
+    """Empty, an empty text or an error: all are 'no value' to a formula that asks."""
+    return value is None or (isinstance(value, str) and (value == "" or value.startswith("#")))
+
+
+def _show(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.15g}"
+    return "no value" if value in (None, "") else str(value)

@@ -1,0 +1,58 @@
+"""Chart specifications drawn by matplotlib: the same charts as in the workbook."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from kfsheet.charts import LOOKS, Chart
+from kfsheet.errors import DataError
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+MARKERS = {"circle": "o", "diamond": "D", "": ""}
+LINES = {"solid": "-", "dash": "--", "": ""}
+
+
+def draw(chart: Chart, frame: pd.DataFrame, ax: Axes | None = None) -> Axes:
+    """Draw a chart of an exercise from the columns of a run.
+
+    Parameters
+    ----------
+    chart : Chart
+        The specification.
+    frame : pandas.DataFrame
+        What :func:`kfsheet.evaluate` returned.
+    ax : matplotlib axes, optional
+        Where to draw; a new figure by default.
+
+    Raises
+    ------
+    DataError
+        If the frame lacks a column of the chart.
+    """
+    import matplotlib.pyplot as plt
+
+    wanted = {name for series in chart.series for name in (series.x, series.y)}
+    if missing := sorted(wanted - set(frame.columns)):
+        raise DataError(f"chart {chart.title!r} needs column {missing[0]}, which the frame lacks")
+    ax = ax or plt.subplots(figsize=(7, 4), layout="constrained")[1]
+    for series in chart.series:
+        look = LOOKS[series.role]
+        ax.plot(
+            frame[series.x],
+            frame[series.y],
+            color=f"#{look.colour}",
+            linestyle=LINES[look.line],
+            marker=MARKERS[look.marker],
+            markersize=4,
+            linewidth=look.width,
+            label=series.label or "_",
+        )
+    if chart.origin_top_left:
+        ax.invert_yaxis()
+    ax.set(title=chart.title, xlabel=chart.x_label, ylabel=chart.y_label)
+    ax.grid(alpha=0.3)
+    ax.legend()
+    return ax
