@@ -15,7 +15,7 @@ _HOMES = {
     "sequential_gain",
     "kfsheet.charts": "Chart Series",
     "kfsheet.errors": "DataError EngineError KfsheetError ModelError PrintError WorkbookError",
-    "kfsheet.evaluate": "evaluate",
+    "kfsheet.evaluation": "evaluate",
     "kfsheet.excel.check": "check_workbook",
     "kfsheet.excel.printer": "excel_code",
     "kfsheet.excel.recalculate": "recalculate",

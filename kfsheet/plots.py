@@ -23,7 +23,7 @@ def draw(chart: Chart, frame: pd.DataFrame, ax: Axes | None = None) -> Axes:
     chart : Chart
         The specification.
     frame : pandas.DataFrame
-        What :func:`kfsheet.evaluate` returned.
+        What :func:`kfsheet.evaluation` returned.
     ax : matplotlib axes, optional
         Where to draw; a new figure by default.
 

@@ -29,21 +29,31 @@ from sympy.printing.precedence import PRECEDENCE
 
 from kfsheet.errors import PrintError
 
+
+def _one_over(x: Expr) -> Expr:
+    return Pow(x, -1, evaluate=False)
+
+
+def _acot(x: Expr) -> Expr:
+    """SymPy's branch, (-pi/2, pi/2]: atan(1/x) with the point x = 0 added."""
+    rest = (sf.atan(_one_over(x), evaluate=False), True)
+    return sf.Piecewise((S.Pi / 2, Eq(x, 0, evaluate=False)), rest, evaluate=False)
+
+
 # Functions that neither Python's math module nor Excel 2010 has, by ones that both have.
-# acot is SymPy's branch, (-pi/2, pi/2]: atan(1/x) with the point x = 0 added.
 RARE_FUNCTIONS = {
-    "cot": lambda x: 1 / sf.tan(x),
-    "sec": lambda x: 1 / sf.cos(x),
-    "csc": lambda x: 1 / sf.sin(x),
-    "coth": lambda x: 1 / sf.tanh(x),
-    "sech": lambda x: 1 / sf.cosh(x),
-    "csch": lambda x: 1 / sf.sinh(x),
-    "acot": lambda x: sf.Piecewise((S.Pi / 2, Eq(x, 0)), (sf.atan(1 / x), True)),
-    "asec": lambda x: sf.acos(1 / x),
-    "acsc": lambda x: sf.asin(1 / x),
-    "acoth": lambda x: sf.atanh(1 / x),
-    "asech": lambda x: sf.acosh(1 / x),
-    "acsch": lambda x: sf.asinh(1 / x),
+    "cot": lambda x: _one_over(sf.tan(x, evaluate=False)),
+    "sec": lambda x: _one_over(sf.cos(x, evaluate=False)),
+    "csc": lambda x: _one_over(sf.sin(x, evaluate=False)),
+    "coth": lambda x: _one_over(sf.tanh(x, evaluate=False)),
+    "sech": lambda x: _one_over(sf.cosh(x, evaluate=False)),
+    "csch": lambda x: _one_over(sf.sinh(x, evaluate=False)),
+    "acot": _acot,
+    "asec": lambda x: sf.acos(_one_over(x), evaluate=False),
+    "acsc": lambda x: sf.asin(_one_over(x), evaluate=False),
+    "acoth": lambda x: sf.atanh(_one_over(x), evaluate=False),
+    "asech": lambda x: sf.acosh(_one_over(x), evaluate=False),
+    "acsch": lambda x: sf.asinh(_one_over(x), evaluate=False),
 }
 
 
@@ -62,7 +72,7 @@ def _size(expression: Basic) -> int:
     return 1 + sum(map(_size, expression.args))
 
 
-def human_factors(expression: Mul) -> list[Expr]:
+def human_factors(factors: list[Expr]) -> list[Expr]:
     """Factors of a product as a person writes them: number, scalars, functions, cells."""
 
     def rank(factor: Expr) -> tuple[int, str]:
@@ -71,7 +81,7 @@ def human_factors(expression: Mul) -> list[Expr]:
         place = next((n for n, kind in enumerate(kinds) if isinstance(core, kind)), len(kinds))
         return place, core.name if isinstance(core, Symbol) else ""
 
-    return sorted(expression.as_ordered_factors(), key=rank)
+    return sorted(factors, key=rank)
 
 
 class FormulaPrinter(CodePrinter):
@@ -123,32 +133,35 @@ class FormulaPrinter(CodePrinter):
 
     def _print_Add(self, expr: Add) -> str:
         first, *rest = human_terms(expr)
-        text = self.parenthesize(first, PRECEDENCE["Add"])
-        if _coeff_isneg(first):
-            text = self._negated(-first)
+        text = self._print(first)
         for term in rest:
-            sign, size = ("-", -term) if _coeff_isneg(term) else ("+", term)
-            text += self.plus[sign] + self.parenthesize(size, PRECEDENCE["Add"])
+            size, minus = _unsigned(term)
+            text += self.plus["-" if minus else "+"]
+            text += self.parenthesize(size, PRECEDENCE["Add"], strict=not minus)
         return text
 
     plus = {"+": " + ", "-": " - "}
 
     def _print_Mul(self, expr: Mul) -> str:
-        if _coeff_isneg(expr):
-            return self._negated(-expr)
-        above, below = [], []
-        for factor in human_factors(expr):
-            if isinstance(factor, Rational):
-                above += [Integer(factor.p)] if factor.p != 1 else []
-                below += [Integer(factor.q)] if factor.q != 1 else []
-            elif isinstance(factor, Pow) and _coeff_isneg(factor.exp):
-                below.append(Pow(factor.base, -factor.exp, evaluate=factor.exp == -1))
+        above, below, negative = [], [], False
+        for factor in human_factors(_factors(expr)):
+            divides = _is_division(factor)
+            size, minus = _unsigned(_divisor(factor) if divides else factor)
+            negative ^= minus
+            if isinstance(size, Rational) and not divides:
+                above += [Integer(size.p)] if size.p != 1 else []
+                below += [Integer(size.q)] if size.q != 1 else []
             else:
-                above.append(factor)
-        return self._product(above) + (f"/{self._denominator(below)}" if below else "")
+                (below if divides else above).append(size)
+        text = self._product(above) + (f"/{self._denominator(below)}" if below else "")
+        return self._minus(text) if negative else text
 
     def _product(self, factors: list[Expr]) -> str:
-        return "*".join(self.parenthesize(f, PRECEDENCE["Mul"]) for f in factors) or "1"
+        return "*".join(map(self._factor, factors)) or "1"
+
+    def _factor(self, factor: Expr) -> str:
+        text = self.parenthesize(factor, PRECEDENCE["Mul"])
+        return f"({text})" if _is_division(factor) else text  # 1/x, one level below a power
 
     def _denominator(self, factors: list[Expr]) -> str:
         text = self._product(factors)
@@ -156,16 +169,16 @@ class FormulaPrinter(CodePrinter):
 
     def _print_Pow(self, expr: Pow) -> str:
         base, exponent = expr.base, expr.exp
-        if _coeff_isneg(exponent):
-            return "1/" + self._denominator([Pow(base, -exponent, evaluate=exponent == -1)])
+        if _is_division(expr):
+            return self._print_Mul(Mul(1, expr, evaluate=False))
         if exponent == S.Half:
             return f"{self.functions['sqrt']}({self._print(base)})"
         level = PRECEDENCE["Pow"]
         return self.parenthesize(base, level) + self.power + self.parenthesize(exponent, level)
 
-    def _negated(self, size: Expr) -> str:
-        """Minus a term that is not itself negative."""
-        return "-" + self.parenthesize(size, PRECEDENCE["Mul"], strict=isinstance(size, Mul))
+    def _minus(self, text: str) -> str:
+        """Minus a product; a language in which minus binds tighter than a power overrides it."""
+        return "-" + text
 
     # -- functions -----------------------------------------------------------------------
 
@@ -193,6 +206,33 @@ class FormulaPrinter(CodePrinter):
         return f"{lhs}{self.relations[expr.rel_op]}{rhs}"
 
     relations = {op: f" {op} " for op in ("==", "!=", "<", "<=", ">", ">=")}
+
+
+def _unsigned(expr: Expr) -> tuple[Expr, bool]:
+    """Size of a term, and whether a minus stands before it, also where SymPy was kept from it."""
+    minus = False
+    while _coeff_isneg(expr):
+        expr, minus = -expr, not minus
+    return expr, minus
+
+
+def _factors(product: Expr) -> list[Expr]:
+    """Factors of a product in canonical order, products within it and 1/tan for cot spelled out."""
+    found = []
+    for factor in product.as_ordered_factors() if isinstance(product, Mul) else [product]:
+        if type(factor).__name__ in RARE_FUNCTIONS:
+            factor = RARE_FUNCTIONS[type(factor).__name__](*factor.args)
+        found += _factors(factor) if isinstance(factor, Mul) else [factor]
+    return found
+
+
+def _is_division(expr: Expr) -> bool:
+    """Whether a power prints as ``1/...``; x**(-y) does not, since 0**(-y) may be 0."""
+    return isinstance(expr, Pow) and expr.exp.is_Number and bool(expr.exp < 0)
+
+
+def _divisor(power: Pow) -> Expr:
+    return power.base if power.exp == -1 else Pow(power.base, -power.exp, evaluate=False)
 
 
 def _ours(cls: type) -> list[type]:

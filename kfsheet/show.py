@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from openpyxl.utils import get_column_letter
 
-from kfsheet.evaluate import evaluate
+from kfsheet.evaluation import evaluate
 from kfsheet.excel.layout import FIRST_ROW, Layout
 from kfsheet.expressions import Missing
 from kfsheet.latex import latex_code, latex_name

@@ -32,6 +32,7 @@ from sympy.logic.boolalg import Boolean
 
 from kfsheet.errors import ModelError
 from kfsheet.expressions import Aggregate, Count, Missing, Observed, SumProduct
+from kfsheet.printing import human_terms
 from kfsheet.pythoncode import python_code
 
 if TYPE_CHECKING:
@@ -135,7 +136,9 @@ class UnitWalker:
             for _, condition in e.args:
                 self.condition(condition)
             return self.agree([value for value, _ in e.args])
-        if isinstance(e, Add | Max | Min | Mod):
+        if isinstance(e, Add):
+            return self.agree(human_terms(e))
+        if isinstance(e, Max | Min | Mod):
             return self.agree(e.args)
         if isinstance(e, Abs | floor | ceiling):
             return self.of(e.args[0])

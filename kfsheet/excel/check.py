@@ -21,7 +21,7 @@ from kfsheet.excel.compare import Comparison
 from kfsheet.excel.compose import Run
 from kfsheet.excel.layout import Address
 from kfsheet.excel.reading import Inputs, layout_of, place
-from kfsheet.excel.recalculate import Changes, open_workbook, recalculate
+from kfsheet.excel.recalculate import Changes, Values, open_workbook, recalculate
 from kfsheet.excel.workbook import compose
 from kfsheet.exercise import Exercise
 

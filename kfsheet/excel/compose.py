@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from openpyxl.utils import get_column_letter
 
 from kfsheet.checks import columns_read
-from kfsheet.evaluate import run
+from kfsheet.evaluation import run
 from kfsheet.excel.layout import FIRST_ROW, PARAMETER_ROW, Layout, quote
 from kfsheet.excel.styles import LEGEND, number_format
 from kfsheet.exercise import Exercise

@@ -88,9 +88,13 @@ class ExcelPrinter(FormulaPrinter):
     def _print__Missing(self, expr: Expr) -> str:
         return '""'
 
-    def _negated(self, size: Expr) -> str:
-        text = super()._negated(size)
-        return f"-({text[1:]})" if _begins_with_power(text[1:]) else text
+    def _minus(self, text: str) -> str:
+        """Minus a product; a power that comes first is put into parentheses of its own.
+
+        ``-(a^2)*b``, not ``-(a^2*b)``: IronCalc 0.9.1 drops the latter's when it loads a file.
+        """
+        end, power = _first_factor(text)
+        return f"-({text[:end]}){text[end:]}" if power else f"-{text}"
 
     def _print_Min(self, expr: Expr) -> str:
         return self._call(self.functions[type(expr).__name__], *expr.args)
@@ -117,10 +121,10 @@ class ExcelPrinter(FormulaPrinter):
         return self._call("IF", *expr.args)
 
     def _print_And(self, expr: Basic) -> str:
-        return self._call("AND", *_in_order(expr))
+        return self._call("AND", *expr.args)
 
     def _print_Or(self, expr: Basic) -> str:
-        return self._call("OR", *_in_order(expr))
+        return self._call("OR", *expr.args)
 
     def _print_Not(self, expr: Basic) -> str:
         return self._call("NOT", *expr.args)
@@ -135,19 +139,17 @@ class ExcelPrinter(FormulaPrinter):
         return AGGREGATES[name].format(*map(self._print, expr.args))
 
 
-def _begins_with_power(text: str) -> bool:
-    """Whether the first factor of a product is a power: a minus before it would take its base."""
-    depth, quoted = 0, False
-    for character in text:
+def _first_factor(text: str) -> tuple[int, bool]:
+    """Where the first factor of a product ends, and whether it is a power."""
+    depth, quoted, power = 0, False, False
+    for place, character in enumerate(text):
         quoted ^= character == "'"
         depth += (character == "(") - (character == ")")
-        if depth == 0 and not quoted and character in "*/^":
-            return character == "^"
-    return False
-
-
-def _in_order(expr: Basic) -> list[Basic]:
-    return sorted(expr.args, key=lambda a: a.sort_key())
+        if depth == 0 and not quoted:
+            if character in "*/":
+                return place, power
+            power |= character == "^"
+    return len(text), power
 
 
 def excel_code(expr: Expr, names: Names | None = None) -> str:

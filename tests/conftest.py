@@ -1,0 +1,38 @@
+"""Fixtures that several test files share."""
+
+import os
+
+import matplotlib
+import pytest
+from hypothesis import settings
+
+from kfsheet.excel.recalculate import ENGINES, libreoffice
+from kfsheet.excel.workbook import write_workbook
+from kfsheet.exercises.football import exercise
+
+matplotlib.use("Agg")
+# The same draws on every machine, and no clock: a slow machine is not a wrong result.
+settings.register_profile("kfsheet", deadline=None, derandomize=True)
+settings.load_profile("kfsheet")
+
+
+def need(engine):
+    """Skip, visibly, what needs LibreOffice where there is none; fail where it is required."""
+    if engine == "libreoffice" and libreoffice() is None:
+        message = "LibreOffice is not installed: the second opinion is missing"
+        if os.environ.get("KFSHEET_REQUIRE_LIBREOFFICE"):
+            pytest.fail(message)
+        pytest.skip(message)
+
+
+@pytest.fixture(params=list(ENGINES))
+def engine(request):
+    """Each independent engine in turn."""
+    need(request.param)
+    return request.param
+
+
+@pytest.fixture(scope="session")
+def football_file(tmp_path_factory):
+    """The football workbook, freshly written; not to be changed."""
+    return write_workbook(exercise, tmp_path_factory.mktemp("built"))

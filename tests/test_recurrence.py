@@ -1,0 +1,233 @@
+"""A recurrence says in plain words what it will not take, at the moment it is written."""
+
+import math
+
+import pytest
+from sympy import Float, Piecewise, Rational, Symbol, exp, pi, sin, sqrt
+
+from kfsheet import (
+    DataError,
+    Mean,
+    ModelError,
+    Observed,
+    Recurrence,
+    RMS,
+    SumProduct,
+    evaluate,
+    t,
+    when_observed,
+)
+from kfsheet.expressions import Missing
+
+
+@pytest.fixture
+def m():
+    """A recurrence with one of everything."""
+    m = Recurrence("demo", title="A demonstration", rows=4)
+    m.parameter("dt", 0.5, "s", "time step", sign="positive")
+    m.parameter("g", 9.8, "m/s2", "gravity")
+    m.data("obs", [1.0, math.nan, 3.0, 4.0], "m", "seen", section="Fall", may_be_missing=True)
+    m.columns("v", "z", section="Fall")
+    return m
+
+
+def parts(m):
+    return [
+        *(m.parameters[n].symbol for n in ("dt", "g")),
+        *(m.table[n].base for n in ("obs", "v", "z")),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("definition", "message"),
+    [
+        (lambda dt, g, obs, v, z: v[t - 1] + Symbol("q"), "reads q, which is not defined"),
+        (lambda dt, g, obs, v, z: v[t] + 1, "circular definition within a row: v -> v"),
+        (lambda dt, g, obs, v, z: v[t + 1], "a later row"),
+        (lambda dt, g, obs, v, z: v[0], "a row is t, t - 1"),
+        (lambda dt, g, obs, v, z: v[t - 2], "give 2 start values"),
+        (lambda dt, g, obs, v, z: v[t - 1] + obs[t], "obs.*may be missing; write when_observed"),
+        (lambda dt, g, obs, v, z: v[t - 1] - Float(9.81) * dt, "make it a parameter"),
+        (lambda dt, g, obs, v, z: v[t - 1] * 86_400, "make it a parameter"),
+        (lambda dt, g, obs, v, z: v[t - 1] > 0, "no number in a row"),
+        (lambda dt, g, obs, v, z: "v[t-1]", "give a SymPy expression"),
+    ],
+)
+def test_a_bad_definition_is_refused_and_changes_nothing(m, definition, message):
+    v = m.table["v"].base
+    with pytest.raises(ModelError, match=message):
+        m.define(v[t], definition(*parts(m)), "m/s", "velocity", start=[0])
+    assert m.table["v"].expression is None
+    m.define(v[t], v[t - 1], "m/s", "velocity", start=[0])
+
+
+def test_two_columns_that_need_each_other_in_the_same_row_are_named(m):
+    v, z = m.table["v"].base, m.table["z"].base
+    m.define(v[t], z[t] / 2, "m/s", "velocity")
+    with pytest.raises(ModelError, match="within a row: v -> z -> v"):
+        m.define(z[t], v[t] + 1, "m", "height")
+
+
+def test_a_circle_through_a_summary_is_refused(m):
+    v, z = m.table["v"].base, m.table["z"].base
+    m.define(v[t], z[t] / 2, "m/s", "velocity")
+    mean_v = m.summary("mean_v", Mean(v), "m/s", "mean velocity")
+    with pytest.raises(ModelError, match="circular definition through a summary"):
+        m.define(z[t], mean_v + 1, "m", "height")
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("R", "row or a column"),
+        ("C", "row or a column"),
+        ("rc", "row or a column"),
+        ("x1", "reads x1 as a cell; write x_1"),
+        ("dt1", "reads dt1 as a cell"),
+        ("XFD9", "as a cell"),
+        ("true", "truth value"),
+        ("lambda", "Python"),
+        ("sqrt", "uses this name itself"),
+        ("t", "uses this name itself"),
+        ("time", "taken"),
+        ("dt", "taken"),
+        ("obs", "taken"),
+        ("DT", "does not tell it from dt"),
+        ("a b", "letters, digits"),
+        ("", "letters, digits"),
+        ("ü", "letters, digits"),
+    ],
+)
+def test_a_name_that_excel_python_or_kfsheet_cannot_take_is_refused(m, name, message):
+    with pytest.raises(ModelError, match=message):
+        m.parameter(name, 1, "", "a parameter")
+
+
+def test_names_that_only_look_like_cells_are_taken(m):
+    for name in ("x_0", "P_xx", "XFE1", "K_x", "rho"):
+        m.parameter(name, 1, "", "a parameter")
+
+
+@pytest.mark.parametrize("unit", ["furlong/foo", "3 m", "m s-"])
+def test_a_unit_that_does_not_parse_is_refused(m, unit):
+    with pytest.raises(ModelError, match="unit"):
+        m.parameter("k", 1, unit, "a parameter")
+
+
+@pytest.mark.parametrize(
+    ("value", "sign", "message"),
+    [
+        (math.inf, "", "finite"),
+        (math.nan, "", "finite"),
+        ("9", "", "must be a number"),
+        (True, "", "must be a number"),
+        (None, "", "must be a number"),
+        (-1, "nonnegative", "0 or greater"),
+        (0, "positive", "greater than 0"),
+    ],
+)
+def test_a_value_that_a_parameter_cannot_have_is_refused(m, value, sign, message):
+    with pytest.raises(DataError, match=message):
+        m.parameter("k", value, "", "a parameter", sign=sign)
+    assert "k" not in m.parameters
+
+
+def test_data_must_be_finite_complete_and_as_long_as_the_table(m):
+    for values, message in [
+        ([1, 2, math.inf, 4], "q, row 2 is inf"),
+        ([1, 2, math.nan, 4], "q, row 2 is nan"),
+        ([1, "2", 3, 4], "q, row 1 is '2'"),
+        ([1, 2], "2 values, the table 4 rows"),
+        ([], "0 values, the table"),
+    ]:
+        with pytest.raises(DataError, match=message):
+            m.data("q", values, "m", "data", section="Fall")
+    m.data("q", [1, 2, 3, 4], "m", "data", section="Fall")
+
+
+def test_a_column_that_was_announced_must_be_defined(m):
+    with pytest.raises(ModelError, match="v is announced but never defined"):
+        evaluate(m)
+
+
+def test_sheets_must_have_names_that_excel_takes(m):
+    for name, message in [
+        ("a/b", "cannot contain /"),
+        ("x" * 32, "1 to 31"),
+        ("check", "another sheet"),
+        ("fall", "another sheet"),
+    ]:
+        with pytest.raises(ModelError, match=message):
+            m.columns("q", section=name)
+
+
+def test_a_guard_covers_exactly_the_cells_it_asks_for(m):
+    dt, g, obs, v, z = parts(m)
+    with pytest.raises(ModelError, match="obs"):
+        m.define(v[t], when_observed(z[t], obs[t], 0), "m", "wrong guard")
+    m.define(z[t], when_observed(obs[t], obs[t] / 2), "m", "half")
+    m.define(v[t], Piecewise((0, ~Observed(z[t])), (z[t], True)), "m", "negative guard")
+    assert evaluate(m)["v"].tolist() == [0.5, 0, 1.5, 2]
+
+
+def test_halves_may_be_written_as_decimals(m):
+    dt, g, obs, v, z = parts(m)
+    m.define(v[t], v[t - 1] - 0.5 * g * dt, "m/s", "velocity", start=[0])
+    assert m.table["v"].expression == v[t - 1] - Rational(1, 2) * g * dt
+
+
+def test_a_column_may_read_a_summary_of_another(m):
+    dt, g, obs, v, z = parts(m)
+    m.define(v[t], t * dt, "s", "ramp")
+    power = m.summary("power", SumProduct(v, v), "s2", "sum of squares")
+    m.define(z[t], v[t] / sqrt(power), "", "normalised")
+    assert math.isclose(sum(evaluate(m)["z"] ** 2), 1)
+
+
+def test_units_that_do_not_agree_are_named_with_both_terms(m):
+    dt, g, obs, v, z = parts(m)
+    m.define(v[t], v[t - 1] - g, "m/s", "velocity, dt forgotten", start=[0])
+    (problem,) = m.check_units()
+    assert problem.name == "v"
+    assert "v[t - 1] is in m/s but -g is in m/s²" in str(problem)
+
+
+def test_the_unit_check_walks_every_kind_of_node(m):
+    dt, g, obs, v, z = parts(m)
+    k = m.parameter("k", 2, "1/s", "rate")
+    d = m.parameter("d", 45, "deg", "an angle")
+    for name, expression, unit in [
+        ("q1", exp(-k * dt), ""),
+        ("q2", sqrt(g * g) * dt, "m/s"),
+        ("q3", Piecewise((g * dt, k * dt > 1), (0, True)), "m/s"),
+        ("q4", sin(pi * k * dt), ""),
+        ("q5", (k * dt) ** 2 + 1, ""),
+    ]:
+        (q,) = m.columns(name, section="Fall")
+        m.define(q[t], expression, unit, "sound")
+    assert m.check_units() == []
+    for name, expression, reason in [
+        ("w1", exp(k), "argument of exp, k, is in 1/s"),
+        ("w2", g ** (k * dt) + g, "m"),
+        ("w3", Piecewise((1, g > k), (0, True)), "g is in m/s² but k is in 1/s"),
+        ("w4", sin(d), "argument of sin, d, is in deg"),
+    ]:
+        (q,) = m.columns(name, section="Fall")
+        m.define(q[t], expression, "", "unsound")
+        assert reason in str(next(p for p in m.check_units() if p.name == name))
+
+
+def test_a_table_need_not_be_a_time_series():
+    m = Recurrence("pixels", title="A row per pixel", step="pixel")
+    w = m.data("w", [0.0, 1.0, 3.0], "", "brightness", section="Picture")
+    place, share = m.columns("place", "share", section="Picture")
+    m.define(place[t], t, "", "where the pixel is")
+    light = m.summary("light", SumProduct(w, w), "", "sum of squares")
+    m.define(share[t], w[t] ** 2 / light, "", "share of the light")
+    assert evaluate(m)["share"].tolist() == [0, 0.1, 0.9]
+
+
+def test_missing_is_one_object_and_prints_its_name():
+    assert str(Missing) == "Missing"
+    assert Missing == type(Missing)()
+    assert RMS(Recurrence("a_b", title="x").columns("v", section="S")[0]).args
