@@ -33,11 +33,11 @@ def test_diagonal_matrices_give_one_scalar_gain_per_quantity(n):
 
 def test_every_intermediate_matrix_can_be_shown():
     A = camera(diag(b_x, b_z))
-    assert A.H == Matrix([[a, 0], [0, -a]])
+    assert Matrix([[a, 0], [0, -a]]) == A.H
     assert A.c == Matrix([0, j_0])
     assert A.BHt == diag(a * b_x, -a * b_z)
     assert A.HBHt == diag(a**2 * b_x, a**2 * b_z)
-    assert A.S == diag(r_i + a**2 * b_x, r_j + a**2 * b_z)
+    assert diag(r_i + a**2 * b_x, r_j + a**2 * b_z) == A.S
     assert simplify(A.S * A.S_inverse) == diag(1, 1)
 
 

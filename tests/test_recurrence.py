@@ -6,12 +6,12 @@ import pytest
 from sympy import Float, Piecewise, Rational, Symbol, exp, pi, sin, sqrt
 
 from kfsheet import (
+    RMS,
     DataError,
     Mean,
     ModelError,
     Observed,
     Recurrence,
-    RMS,
     SumProduct,
     evaluate,
     t,

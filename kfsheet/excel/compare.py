@@ -15,16 +15,20 @@ more from the *engine's own* values of its inputs: where that agrees, the cell o
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from functools import cached_property
 from typing import Any
 
 from openpyxl import Workbook
+from sympy import Expr, Indexed, IndexedBase
 
 from kfsheet import numerics
+from kfsheet.checks import walk
 from kfsheet.excel.compose import Page, Piece
 from kfsheet.excel.layout import FIRST_ROW, Address, Layout
 from kfsheet.excel.recalculate import Values
 from kfsheet.excel.workbook import is_formula
+from kfsheet.expressions import lag, t
 from kfsheet.pythoncode import python_code
 
 
@@ -88,10 +92,10 @@ class Comparison:
 
     # -- culprits --------------------------------------------------------------------------
 
-    def _homes(self) -> dict[Address, tuple[Any, int]]:
+    def _homes(self) -> dict[Address, tuple[Expr, int]]:
         """The definition and row behind each formula cell of the model."""
         layout, model = self.layout, self.layout.model
-        homes: dict[Address, tuple[Any, int]] = {}
+        homes: dict[Address, tuple[Expr, int]] = {}
         for column in model.all_columns():
             for sheet, those in layout.columns.items():
                 if column.name in those and not column.is_data:
@@ -102,15 +106,46 @@ class Comparison:
             homes[layout.scalars[name]] = (scalar.expression, 0)
         return homes
 
-    def _judge(self, address: Address, piece: Piece, rule: Any, row: int) -> None:
+    def _judge(self, address: Address, piece: Piece, rule: Expr, row: int) -> None:
         """Compute one cell from the engine's values of its inputs; if it differs, it is wrong."""
+        inputs = list(self._inputs(address, rule, row))
+        if any(cell in self.problems and cell[2] == self._step(cell[0]) for cell in inputs):
+            return  # the step index beside it is wrong
+        if _error(self.value(address)) and any(_error(self.value(cell)) for cell in inputs):
+            return
         try:
             local = eval(python_code(rule), {**self._namespace, "t": row})  # our own source
         except (ArithmeticError, ValueError):
             local = math.nan
         expected = "" if isinstance(local, float) and math.isnan(local) else local
-        if not self._agree(expected, self.value(address), piece.scale, keep=False):
+        scale = max([piece.scale, *(abs(_number(self.value(cell))) for cell in inputs)], key=_size)
+        if not self._agree(expected, self.value(address), scale, keep=False):
             self.problems[address] = self._words(expected, address)
+
+    def _step(self, sheet: str) -> int | None:
+        return self.layout.columns.get(sheet, {}).get("t")
+
+    def _inputs(self, address: Address, rule: Expr, row: int) -> Iterator[Address]:
+        """Cells that a formula reads."""
+        whole = set()
+        for node in walk(rule):
+            if isinstance(node, Indexed):
+                sheet, column = self._column(str(node.base.label), address[0])
+                yield sheet, FIRST_ROW + row - int(lag(node)), column
+            elif isinstance(node, IndexedBase):
+                whole.add(str(node.label))
+            elif node == t:
+                yield address[0], address[1], self._step(address[0])
+            elif node.is_Symbol:
+                yield self.layout.scalars[node.name]
+        for name in whole:
+            sheet, column = self.layout.home(name)
+            rows = range(FIRST_ROW, FIRST_ROW + self.layout.model.rows)
+            yield from ((sheet, row, column) for row in rows)
+
+    def _column(self, name: str, sheet: str) -> tuple[str, int]:
+        own = self.layout.columns.get(sheet, {})
+        return (sheet, own[name]) if name in own else self.layout.home(name)
 
     @cached_property
     def _namespace(self) -> dict[str, Any]:
@@ -153,9 +188,17 @@ def _number(value: Any) -> float:
     return value if number else math.nan
 
 
+def _size(value: float) -> float:
+    return -1.0 if math.isnan(value) else value
+
+
+def _error(value: Any) -> bool:
+    return isinstance(value, str) and value.startswith("#")
+
+
 def _no_number(value: Any) -> bool:
     """Empty, an empty text or an error: all are 'no value' to a formula that asks."""
-    return value is None or (isinstance(value, str) and (value == "" or value.startswith("#")))
+    return value is None or value == "" or _error(value)
 
 
 def _show(value: Any) -> str:

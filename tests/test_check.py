@@ -1,0 +1,206 @@
+"""``kfsheet check`` can fail: every kind of damage is reported, at exactly the damaged cell."""
+
+import re
+
+import openpyxl
+import pytest
+
+from kfsheet import DataError, EngineError, WorkbookError, check_workbook, recalculate
+from kfsheet.excel.reading import exercise_name
+from kfsheet.excel.recalculate import open_workbook
+from kfsheet.exercises.football import exercise
+
+
+@pytest.fixture
+def damaged(football_file, tmp_path):
+    """Write a copy in which cells have been changed: ``damaged({"Reanalysis!G9": "=K8"})``."""
+
+    def make(changes):
+        book = openpyxl.load_workbook(football_file)
+        for place, content in changes.items():
+            sheet, cell = place.split("!")
+            book[sheet][cell] = content(book[sheet][cell].value) if callable(content) else content
+        path = tmp_path / "damaged.xlsx"
+        book.save(path)
+        return path
+
+    return make
+
+
+def places(report):
+    return [str(problem).split(": ")[0] for problem in report.problems]
+
+
+def test_an_untouched_workbook_holds(engine, football_file):
+    report = check_workbook(football_file, exercise, engine)
+    assert report.holds
+    assert report.cells > 1000
+    assert report.largest < (1e-12 if engine == "ironcalc" else 1e-11)
+    assert report.changed == []
+
+
+def test_changed_parameters_and_photos_are_told_and_still_hold(engine, damaged):
+    path = damaged({"Parameters!B12": 900, "Parameters!B18": 0, "Reanalysis!C9": None})
+    report = check_workbook(path, exercise, engine)
+    assert report.holds
+    assert report.changed == ["r_i 9 -> 900", "h 0.5 -> 0", "1 value of i"]
+
+
+@pytest.mark.parametrize(
+    ("place", "damage"),
+    [
+        ("Reanalysis!G9", lambda f: f.replace("+dt*", "-dt*")),  # a changed sign
+        ("Reanalysis!G9", lambda f: f.replace("-dt^p", "+dt^p")),
+        ("Reanalysis!L12", lambda f: f.replace("+K_z", "-K_z")),
+        ("Reanalysis!E10", lambda f: f.replace("E9", "E8")),  # one row off by one
+        ("Reanalysis!G9", lambda f: f.replace("K8", "K7")),
+        ("Reanalysis!K9", lambda f: f.replace("G9", "G8")),
+        ("Free run!E11", lambda f: f.replace("E10", "E9")),
+        ("Goal line!F12", lambda f: f.replace("/2", "")),
+        ("Reanalysis!G9", 14.722150819752194),  # a number typed over the formula, still right
+        ("Reanalysis!G9", lambda f: f.replace("dt*", "0.1*", 1)),  # ... or into it
+        ("Reanalysis!K9", lambda f: f.replace("K_x", "0.01548898950112839")),
+        ("Parameters!B23", lambda f: f.replace("r_i", "9")),
+        ("Parameters!G5", lambda f: f.replace("$19", "$18")),
+        ("Pixel frame!C9", None),  # a formula deleted
+        ("Charts!AA9", "=Reanalysis!I9*0"),
+        ("Check!D50", lambda f: f + "+1"),
+        ("Reanalysis!A9", 99),  # the step index
+        ("Reanalysis!I4", 5),  # a value where there is none
+    ],
+)
+def test_one_damaged_cell_is_reported_and_no_other(damaged, place, damage):
+    report = check_workbook(damaged({place: damage}), exercise)
+    assert [p.replace("'", "") for p in places(report)] == [place]
+
+
+def test_libreoffice_finds_the_same_culprit(engine, damaged):
+    path = damaged({"Reanalysis!G9": lambda f: f.replace("+dt*", "-dt*")})
+    report = check_workbook(path, exercise, engine)
+    assert places(report) == ["Reanalysis!G9"]
+    assert report.followers > 100
+
+
+def test_the_rule_is_not_blind_any_changed_sign_or_reference_is_found(damaged, football_file):
+    """One mutation for every formula of a row in the middle, over all sections."""
+    book = openpyxl.load_workbook(football_file)
+    missed, tried = [], 0
+    for section in exercise.model.sections:
+        for cell in book[section][10][2:]:
+            if not isinstance(cell.value, str):
+                continue
+            mutant = _mutant(cell.value)
+            if mutant is None:
+                continue
+            place = f"{section}!{cell.coordinate}"
+            tried += 1
+            report = check_workbook(damaged({place: mutant}), exercise)
+            found = [p.replace("'", "") for p in places(report)]
+            missed += [] if found == [place] else [(place, mutant, found)]
+    assert missed == []
+    assert tried > 30
+
+
+def _mutant(formula):
+    """Flip the first sign between two terms; where there is none, double the whole."""
+    flipped = re.sub(r"(?<=[\w)])[+-](?=[\w(])", lambda m: "+-"[m[0] == "+"], formula, count=1)
+    return flipped if flipped != formula else f"=2*({formula[1:]})"
+
+
+def test_two_damaged_cells_are_both_reported(damaged):
+    path = damaged({"Reanalysis!G9": "=K8", "Free run!F12": "=0"})
+    assert places(check_workbook(path, exercise)) == ["'Free run'!F12", "Reanalysis!G9"]
+
+
+def test_stored_values_are_never_believed(engine, football_file, tmp_path):
+    """A formula is damaged inside the zip and the right value stays stored beside it."""
+    import zipfile
+
+    path = tmp_path / "liar.xlsx"
+    with zipfile.ZipFile(football_file) as old, zipfile.ZipFile(path, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            if name == "xl/worksheets/sheet3.xml":
+                assert content.count(b"<f>K8+dt*E9") == 1
+                content = content.replace(b"<f>K8+dt*E9", b"<f>K8-dt*E9")
+            new.writestr(name, content)
+    kept = openpyxl.load_workbook(path, data_only=True)["Reanalysis"]["G9"].value
+    assert kept == pytest.approx(14.722, abs=1e-3)
+    assert recalculate(path, engine)["Reanalysis"][9, 7] == pytest.approx(17.994, abs=1e-3)
+    assert places(check_workbook(path, exercise, engine)) == ["Reanalysis!G9"]
+
+
+def test_inserted_columns_and_helper_cells_do_not_disturb(damaged):
+    path = damaged({"Reanalysis!N5": "=K5*2", "Reanalysis!M1": "my notes", "Parameters!K3": 5})
+    assert check_workbook(path, exercise).holds
+
+
+def test_a_workbook_saved_by_libreoffice_still_holds(football_file, tmp_path):
+    from conftest import need
+
+    from kfsheet.excel.recalculate import convert
+
+    need("libreoffice")
+    again = convert(football_file, tmp_path, "xlsx:Calc MS Excel 2007 XML")
+    report = check_workbook(again, exercise)
+    assert report.holds, list(map(str, report.problems))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"Parameters!B5": 0}, r"dt in Parameters!B5 of damaged.xlsx is 0.*greater than 0"),
+        ({"Parameters!B10": -1}, r"b_x in Parameters!B10.*0 or greater"),
+        ({"Parameters!B5": "soon"}, "Parameters!B5.*'soon'; it must be a number"),
+        ({"Parameters!B5": None}, "Parameters!B5.*None; it must be a number"),
+        ({"Reanalysis!C9": "blurred"}, "i in Reanalysis!C9.*'blurred'; it must be a number"),
+        ({"Errors!C9": None}, "x_true in Errors!C9.*empty; it must be a number"),
+    ],
+)
+def test_inputs_that_cannot_be_used_are_named_by_cell(damaged, changes, message):
+    with pytest.raises(DataError, match=message):
+        check_workbook(damaged(changes), exercise)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"Reanalysis!C20": 5}, "C20 lies below the table"),
+        ({"Reanalysis!G1": "forecast"}, "no column 'x_f' in row 1"),
+    ],
+)
+def test_a_workbook_that_lost_its_shape_is_refused(damaged, changes, message):
+    with pytest.raises(WorkbookError, match=message):
+        check_workbook(damaged(changes), exercise)
+
+
+def test_a_sheet_or_a_name_that_is_gone_is_named(football_file, tmp_path):
+    book = openpyxl.load_workbook(football_file)
+    book["Free run"].title = "Flight"
+    book.save(tmp_path / "renamed.xlsx")
+    with pytest.raises(WorkbookError, match="'Free run' is gone or renamed"):
+        check_workbook(tmp_path / "renamed.xlsx", exercise)
+    book = openpyxl.load_workbook(football_file)
+    del book.defined_names["K_x"]
+    book.save(tmp_path / "nameless.xlsx")
+    with pytest.raises(WorkbookError, match="no cell is named K_x"):
+        check_workbook(tmp_path / "nameless.xlsx", exercise)
+
+
+def test_what_is_no_workbook_and_what_is_not_ours_is_refused(tmp_path):
+    text = tmp_path / "text.xlsx"
+    text.write_text("photo,t,i,j")
+    for call in (open_workbook, recalculate):
+        with pytest.raises(WorkbookError, match="not a workbook"):
+            call(text)
+        with pytest.raises(WorkbookError, match="cannot be read"):
+            call(tmp_path / "nowhere.xlsx")
+    foreign = tmp_path / "foreign.xlsx"
+    openpyxl.Workbook().save(foreign)
+    with pytest.raises(WorkbookError, match="not one of ours"):
+        exercise_name(open_workbook(foreign), foreign)
+
+
+def test_an_unknown_engine_is_refused(football_file):
+    with pytest.raises(EngineError, match="no engine 'excel'; there is ironcalc, libreoffice"):
+        recalculate(football_file, "excel")
