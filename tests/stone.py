@@ -8,7 +8,7 @@ m = Recurrence("stone", title="A stone falls with linear drag", step="frame")
 dt = m.parameter("dt", 0.1, "s", "time step", sign="positive")
 g = m.parameter("g", 9.81, "m/s2", "gravity")
 k = m.parameter("k", 0.5, "1/s", "drag over mass", sign="positive")
-K = m.parameter("K", 0.4, "", "gain: how far the analysis follows the ruler")
+K = m.parameter("K_z", 0.4, "", "gain: how far the analysis follows the ruler")
 m.time(t * dt, "s", "time")
 
 page = "Fall"
@@ -25,7 +25,7 @@ m.summary("rms_e", RMS(e), "m", "rms error")
 
 exercise = Exercise(
     model=m,
-    about=("A stone falls. Change k and K, and see the forecast and the analysis follow.",),
+    about=("A stone falls. Change k and K_z, and see the forecast and the analysis follow.",),
     source="a lecturer's own",
     charts=(Chart("Fall", "time (s)", "z (m)", (Series("time", "z_a", "analysis", "analysis"),)),),
     questions=(Question("z_f", 2, "One step of the model."),),

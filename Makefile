@@ -1,0 +1,45 @@
+# make          set up .venv, build the workbooks, execute the notebooks
+# make test     run every test
+PYTHON ?= python3
+BIN := .venv/bin
+READY := .venv/ready
+
+.PHONY: all workbooks notebooks test format clean
+.DEFAULT_GOAL := all
+
+all: workbooks notebooks
+	@echo
+	@echo "Open workbooks/football.xlsx in any spreadsheet program,"
+	@echo "and the notebooks with: $(BIN)/jupyter lab notebooks"
+
+$(READY): environment.txt pyproject.toml
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "kfsheet needs Python 3.11 or newer")'
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r environment.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $@
+
+workbooks: $(READY)
+	$(BIN)/kfsheet build
+
+notebooks: $(READY)
+	$(BIN)/python tools/execute_notebooks.py
+
+test: $(READY)
+	$(BIN)/ruff check --quiet .
+	$(BIN)/ruff format --quiet --check .
+	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest --nbval notebooks
+
+format: $(READY)
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+# Needs uv, https://docs.astral.sh/uv; only for those who change pyproject.toml.
+environment.txt: pyproject.toml
+	@command -v uv > /dev/null || { touch $@; exit 0; } && \
+	{ echo "# Every package at its version. Made from pyproject.toml by: make environment.txt"; \
+	uv pip compile -q --universal --python-version 3.11 --all-extras --no-header --no-annotate $<; } > $@
+
+clean:
+	rm -rf .venv
