@@ -4,7 +4,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: all workbooks notebooks test format clean
+.PHONY: all workbooks notebooks test format pin clean
 .DEFAULT_GOAL := all
 
 all: workbooks notebooks
@@ -35,11 +35,11 @@ format: $(READY)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-# Needs uv, https://docs.astral.sh/uv; only for those who change pyproject.toml.
-environment.txt: pyproject.toml
-	@command -v uv > /dev/null || { touch $@; exit 0; } && \
-	{ echo "# Every package at its version. Made from pyproject.toml by: make environment.txt"; \
-	uv pip compile -q --universal --python-version 3.11 --all-extras --no-header --no-annotate $<; } > $@
+# After a change of pyproject.toml; needs uv, which `pip install uv` brings.
+pin:
+	echo "# Every package at its version. Made from pyproject.toml by: make pin" > environment.txt
+	uv pip compile -q --universal --python-version 3.11 --all-extras --no-header --no-annotate \
+	    pyproject.toml >> environment.txt
 
 clean:
 	rm -rf .venv

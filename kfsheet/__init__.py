@@ -28,6 +28,7 @@ _HOMES = {
     "kfsheet.plots": "draw",
     "kfsheet.pythoncode": "python_code python_source",
     "kfsheet.recurrence": "Recurrence",
+    "kfsheet.show": "formula_table",
     "kfsheet.tables": "read_table",
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names.split()}

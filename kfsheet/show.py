@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from typing import TYPE_CHECKING
 
 from openpyxl.utils import get_column_letter
 
+from kfsheet.errors import ModelError
 from kfsheet.evaluation import evaluate
 from kfsheet.excel.layout import FIRST_ROW, Layout
 from kfsheet.expressions import Missing
@@ -14,6 +16,9 @@ from kfsheet.parts import Column
 from kfsheet.pythoncode import python_source
 from kfsheet.recurrence import Recurrence
 from kfsheet.units import pretty_unit
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 WIDTH = 80
 
@@ -46,22 +51,44 @@ def as_excel(model: Recurrence) -> str:
         lines.append(f"  {name:12} {get_column_letter(column)}{row:<5} {formula}")
     for section, columns in model.sections.items():
         lines += ["", section]
-        clock = [model.clock] if model.clock else []
-        for column in (*clock, *columns):
-            lines += _column_lines(layout, section, column)
+        for column in (*([model.clock] if model.clock else []), *columns):
+            letter = get_column_letter(layout.columns[section][column.name])
+            rows = range(max(1, len(column.rules)))
+            for row, text in zip(rows, _texts(layout, section, column, rows), strict=True):
+                name = "" if row else column.name
+                lines.append(f"  {name:12} {letter}{row + FIRST_ROW:<5} {text}")
     return "\n".join(lines)
 
 
-def _column_lines(layout: Layout, section: str, column: Column) -> list[str]:
-    letter, name = get_column_letter(layout.columns[section][column.name]), column.name
-    if column.is_data:
-        return [f"  {name:12} {letter}{FIRST_ROW:<5} (data)"]
-    lines = []
-    for row, rule in enumerate(column.rules, FIRST_ROW):
-        text = "(empty)" if rule is Missing else layout.formula(rule, section)(row)
-        lines.append(f"  {name:12} {letter}{row:<5} {text}")
-        name = ""
-    return lines
+def _texts(layout: Layout, section: str, column: Column, rows: Iterable[int]) -> Iterator[str]:
+    """What stands in some rows of a column: formulas, or what takes their place."""
+    for row in rows:
+        rule = column.definition(row)
+        if column.is_data:
+            yield "(data)"
+        else:
+            yield "" if rule is Missing else layout.formula(rule, section)(FIRST_ROW + row)
+
+
+def formula_table(model: Recurrence, section: str, rows: int = 3) -> pd.DataFrame:
+    """Formulas of the first rows of a worksheet: one line per column, one column per row.
+
+    Raises
+    ------
+    ModelError
+        If the recurrence has no such section.
+    """
+    import pandas as pd
+
+    if section not in model.sections:
+        raise ModelError(f"no section {section!r}; there is {', '.join(model.sections)}")
+    layout = Layout.standard(model)
+    table = {
+        column.name: list(_texts(layout, section, column, range(rows)))
+        for column in model.sections[section]
+    }
+    headers = [f"row {FIRST_ROW + row}" for row in range(rows)]
+    return pd.DataFrame.from_dict(table, orient="index", columns=headers)
 
 
 def as_table(model: Recurrence) -> str:

@@ -173,7 +173,10 @@ def test_check_asks_for_the_file_of_an_exercise_it_does_not_know(run, tmp_path):
     [
         ("x = 1\ny = (\n", "line 2: SyntaxError"),
         ("import kfsheet\n1/0\n", "line 2: ZeroDivisionError: division by zero"),
-        ("from kfsheet import Recurrence\nRecurrence('a b', title='')\n", "line 2: recurrence 'a b'"),
+        (
+            "from kfsheet import Recurrence\nRecurrence('a b', title='')\n",
+            "line 2: recurrence 'a b'",
+        ),
         ("exercise = 5\n", "defines no exercise"),
     ],
 )

@@ -1,0 +1,66 @@
+"""Make the notebooks from their py:percent sources, and execute them.
+
+    python tools/execute_notebooks.py [notebooks/01_football.py ...]
+
+The same source gives the same file: cells are numbered, times and versions are left out, and the
+output of a cell tagged ``interactive`` (a widget, with random names) is dropped.
+"""
+
+import sys
+from pathlib import Path
+
+import jupytext
+import nbformat
+from nbclient import NotebookClient
+
+from kfsheet.cli import progress
+from kfsheet.excel.finish import write_file
+
+FOLDER = Path(__file__).parents[1] / "notebooks"
+KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
+
+
+def unexecuted(source: Path) -> nbformat.NotebookNode:
+    """The notebook of a source, without outputs."""
+    notebook = jupytext.read(source)
+    for number, cell in enumerate(notebook.cells, 1):
+        cell.id = f"cell-{number:02d}"
+    notebook.metadata = nbformat.from_dict(
+        {
+            "jupytext": {"formats": "ipynb,py:percent"},
+            "kernelspec": KERNEL,
+            "language_info": {"name": "python"},
+        }
+    )
+    notebook.nbformat, notebook.nbformat_minor = 4, 5
+    return notebook
+
+
+def executed(source: Path) -> nbformat.NotebookNode:
+    """The notebook of a source, with outputs and nothing that another run would change."""
+    notebook = unexecuted(source)
+    client = NotebookClient(
+        notebook,
+        timeout=600,
+        resources={"metadata": {"path": str(FOLDER)}},
+        extra_arguments=["--IPKernelApp.log_level=40"],  # errors only
+    )
+    client.execute()
+    for cell in notebook.cells:
+        cell.metadata.pop("execution", None)
+        if "interactive" in cell.metadata.get("tags", []):
+            cell.outputs = []
+    notebook.metadata = unexecuted(source).metadata
+    return notebook
+
+
+def main(names: list[str]) -> None:
+    """Execute the notebooks named, or all."""
+    sources = [Path(name) for name in names] or sorted(FOLDER.glob("*.py"))
+    for source in progress(sources, "notebook", [s.name for s in sources]):
+        text = nbformat.writes(executed(source)) + "\n"
+        write_file(source.with_suffix(".ipynb"), text.encode())
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
