@@ -54,5 +54,7 @@ def draw(chart: Chart, frame: pd.DataFrame, ax: Axes | None = None) -> Axes:
         ax.invert_yaxis()
     ax.set(title=chart.title, xlabel=chart.x_label, ylabel=chart.y_label)
     ax.grid(alpha=0.3)
-    ax.legend()
+    # Below, as in the workbook: inside, it would hide what the chart is about.
+    place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16), "ncols": len(chart.series)}
+    ax.legend(**place, frameon=False, fontsize="small", columnspacing=1.2)
     return ax

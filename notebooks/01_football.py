@@ -129,8 +129,8 @@ printed = kf.evaluate(football)
 _ = kf.draw(exercise.charts[0], printed)
 
 # %% [markdown]
-# The free run is hopeless, so the photos do help. But look at the blue dots: they trail behind the
-# truth. How large are the errors, in metres?
+# The free run is hopeless, so the photos do help, and the analysis lies on the path. But a dot on
+# the path can still be early or late. How large are the errors, in metres?
 
 
 # %%

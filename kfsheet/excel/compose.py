@@ -188,10 +188,10 @@ def charts_page(exercise: Exercise, layout: Layout, now: Run) -> Page:
     page.put(1, 1, exercise.title, "title")
     names = plotted(exercise)
     if names:
-        page.put(2, 1, "From column AA on: what is plotted where a value may be missing.", "words")
+        page.put(2, 1, "The columns from AA on are plotted where a value may be missing.")
     for at, name in enumerate(names, PLOTTED_COLUMN):
         column = exercise.model.column(name)
-        _head(page, at, name, column.unit, f"{name} for the charts: #N/A leaves a gap")
+        _head(page, at, name, column.unit, "plotted")
         sheet, number = layout.home(name)
         letter, values = get_column_letter(number), now.columns[name]
         shape = number_format(values)
@@ -209,7 +209,7 @@ def chart_range(exercise: Exercise, layout: Layout, name: str) -> tuple[str, int
     return ("Charts", PLOTTED_COLUMN + names.index(name)) if name in names else layout.home(name)
 
 
-CHARACTERS_A_LINE = 115  # of the two columns of "Read me" together
+CHARACTERS_A_LINE = 130  # of the two columns of "Read me" together
 
 
 def readme_page(exercise: Exercise, layout: Layout) -> Page:

@@ -6,7 +6,15 @@ from openpyxl.chart import Reference, ScatterChart
 from openpyxl.chart import Series as NativeSeries
 from openpyxl.chart.legend import LegendEntry
 from openpyxl.chart.shapes import GraphicalProperties
+from openpyxl.chart.text import RichText, Text
+from openpyxl.chart.title import Title
 from openpyxl.drawing.line import LineProperties
+from openpyxl.drawing.text import (
+    CharacterProperties,
+    Paragraph,
+    ParagraphProperties,
+    RegularTextRun,
+)
 from openpyxl.utils import get_column_letter
 from openpyxl.workbook import Workbook
 
@@ -15,15 +23,22 @@ from kfsheet.excel.compose import chart_range
 from kfsheet.excel.layout import FIRST_ROW, Layout
 from kfsheet.exercise import Exercise
 
-WIDTH, HEIGHT = 17.0, 9.5  # cm
-ROWS_A_CHART, FIRST_CHART_ROW = 22, 4
-COLUMNS = (1, 12)  # in which a chart begins: two charts beside each other
+WIDTH, HEIGHT = 17.0, 11.0  # cm
+ROWS_A_CHART, FIRST_CHART_ROW = 24, 4
+COLUMNS = (1, 11)  # in which a chart begins: two charts beside each other
+COLUMN_WIDTH, ROW_HEIGHT = 9.0, 15.0  # said, since programs differ in what they take for granted
 POINT = 12_700  # English metric units
 
 
 def draw(book: Workbook, exercise: Exercise, layout: Layout) -> None:
     """Add every chart of the exercise to the sheet "Charts", each under its note."""
     sheet = book["Charts"]
+    for column in range(1, 2 * COLUMNS[1] - 1):
+        sheet.column_dimensions[get_column_letter(column)].width = COLUMN_WIDTH
+    sheet.sheet_format.defaultRowHeight, sheet.sheet_format.customHeight = ROW_HEIGHT, True
+    sheet.page_setup.fitToHeight = 1
+    rows = FIRST_CHART_ROW + ROWS_A_CHART * -(-len(exercise.charts) // 2)
+    sheet.print_area = f"A1:{get_column_letter(2 * COLUMNS[1] - 2)}{rows}"
     for n, chart in enumerate(exercise.charts):
         row = FIRST_CHART_ROW + ROWS_A_CHART * (n // 2)
         column = COLUMNS[n % 2]
@@ -34,11 +49,11 @@ def draw(book: Workbook, exercise: Exercise, layout: Layout) -> None:
 
 def _native(book: Workbook, exercise: Exercise, layout: Layout, chart: Chart) -> ScatterChart:
     native = ScatterChart(scatterStyle="lineMarker")
-    native.title, native.style = chart.title, 2
+    native.title, native.style = _title(chart.title, 12), 2
     native.width, native.height = WIDTH, HEIGHT
     native.legend.position = "b"
     for axis, label in ((native.x_axis, chart.x_label), (native.y_axis, chart.y_label)):
-        axis.title, axis.delete, axis.number_format = label, False, "General"
+        axis.title, axis.delete, axis.number_format = _title(label, 9), False, "General"
         axis.majorGridlines.spPr = _line(Look("D9D9D9", width=0.75))
         axis.tickLblPos = "low"
     if chart.origin_top_left:
@@ -51,6 +66,14 @@ def _native(book: Workbook, exercise: Exercise, layout: Layout, chart: Chart) ->
             unlabelled.append(n)
     _hide_from_legend(native, unlabelled)
     return native
+
+
+def _title(text: str, points: int) -> Title:
+    """A title in a size that leaves room for the chart."""
+    font = CharacterProperties(sz=100 * points, b=points > 10)
+    run = RegularTextRun(rPr=font, t=text)
+    paragraph = Paragraph(pPr=ParagraphProperties(defRPr=font), r=[run])
+    return Title(tx=Text(rich=RichText(p=[paragraph])), overlay=False)
 
 
 def _hide_from_legend(native: ScatterChart, indices: list[int]) -> None:

@@ -64,7 +64,13 @@ class Styles:
             model.border = Border(*[Side("thin", color="FF" + LINE)] * 4)
         wrap = align == "wrap"
         horizontal = {"wrap": None, "": None}.get(align, align)
-        model.alignment = Alignment(horizontal=horizontal, vertical="top", wrap_text=wrap)
+        indent = 1 if kind == "text" and wrap else 0
+        model.alignment = Alignment(
+            horizontal=horizontal or ("left" if indent else None),
+            vertical="top",
+            wrap_text=wrap,
+            indent=indent,
+        )
         if number_format:
             model.number_format = number_format
         return model._style

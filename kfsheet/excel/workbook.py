@@ -29,6 +29,7 @@ from kfsheet.excel.layout import FIRST_ROW, Layout
 from kfsheet.excel.styles import Styles
 from kfsheet.exercise import Exercise
 
+TITLE_HEIGHT = 26
 TABS = {"Read me": "1F3864", "Parameters": "FFC000", "Charts": "0072B2", "Check": "70AD47"}
 
 
@@ -105,6 +106,8 @@ def _write_page(book: Workbook, styles: Styles, page: Page) -> None:
         sheet.column_dimensions[get_column_letter(column)].width = size
     for row, size in page.heights.items():
         sheet.row_dimensions[row].height = size
+    if page.pieces[1, 1].kind == "title":
+        sheet.row_dimensions[1].height = TITLE_HEIGHT
     for cells in page.merges:
         sheet.merge_cells(cells)
     sheet.freeze_panes = page.freeze or None

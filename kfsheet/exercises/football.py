@@ -286,7 +286,7 @@ CHARTS = (
             Series("time", "e_x_cam", "camera alone", "observation"),
             Series("time", "e_x_a", "analysis", "analysis"),
         ),
-        note="As printed, the analysis of x is worse than the camera alone.",
+        note="With the model as printed, the analysis of x is worse than the camera alone.",
     ),
     Chart(
         "Height at the goal line, forecast from each photo",
