@@ -32,7 +32,7 @@ def latex_name(name: str, *indices: str) -> str:
     r"""``e_x_a`` as e_{x,a}, Greek names as Greek letters.
 
     >>> latex_name("sigma_theta", "t")
-    '\\\\sigma_{\\\\theta,t}'
+    '\\sigma_{\\theta,t}'
     """
     head, *rest = (_greek(part) for part in re.split("_+", name))
     subscript = ",".join([*filter(None, rest), *indices])

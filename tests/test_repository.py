@@ -3,6 +3,7 @@
 import re
 import subprocess
 import tomllib
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -49,7 +50,7 @@ def test_readme_names_every_command():
 
 def test_the_environment_holds_every_pin_of_the_project():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    wanted = [*project["dependencies"], *sum(project["optional-dependencies"].values(), [])]
+    wanted = [*project["dependencies"], *chain(*project["optional-dependencies"].values())]
     lines = (ROOT / "environment.txt").read_text().splitlines()
     pins = {line.split(";")[0].strip().lower() for line in lines}
     assert {w.lower() for w in wanted} <= pins
