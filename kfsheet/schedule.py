@@ -70,24 +70,25 @@ def _level_of(level: dict[str, int]):
 
 
 def _in_order(columns: Iterable[Column], row: int) -> list[Column]:
-    pending = list(columns)
-    waiting = {c.name: same_row(c.definition(row)) for c in pending}
+    waiting = {c.name: (c, same_row(c.definition(row))) for c in columns}
     ordered: list[Column] = []
-    while pending:
-        ready = next((c for c in pending if not waiting[c.name] & {p.name for p in pending}), None)
+    while waiting:
+        ready = next(
+            (name for name, (_, reads) in waiting.items() if not reads & set(waiting)), None
+        )
         if ready is None:
-            circle = " -> ".join(_circle(pending[0].name, waiting))
+            reads = {name: reads & set(waiting) for name, (_, reads) in waiting.items()}
+            circle = " -> ".join(_circle(reads))
             raise ModelError(f"circular definition within a row: {circle}")
-        ordered.append(ready)
-        pending.remove(ready)
+        ordered.append(waiting.pop(ready)[0])
     return ordered
 
 
-def _circle(name: str, waiting: dict[str, set[str]]) -> list[str]:
-    """Follow what each column waits for until a name comes back."""
-    path = [name]
+def _circle(reads: dict[str, set[str]]) -> list[str]:
+    """Follow what each column waits for until a name comes back; every one waits for another."""
+    path = [next(iter(reads))]
     while True:
-        following = min(w for w in waiting[path[-1]] if waiting.get(w))
+        following = min(reads[path[-1]])
         if following in path:
             return [*path[path.index(following) :], following]
         path.append(following)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING
 
@@ -24,8 +25,24 @@ WIDTH = 80
 
 
 def as_python(model: Recurrence) -> str:
-    """The generated Python module."""
-    return python_source(model)
+    """The generated Python module, its long assignments broken between terms."""
+    lines = python_source(model).splitlines()
+    return "\n".join(part for line in lines for part in _broken(line))
+
+
+def _broken(line: str) -> list[str]:
+    """A long ``name = formula`` in parentheses, one term a line."""
+    if len(line) < WIDTH or " = " not in line:
+        return [line]
+    left, formula = line.split(" = ", 1)
+    indent = " " * (len(line) - len(line.lstrip()))
+    cuts, depth = [0], 0
+    for place, character in enumerate(formula):
+        depth += (character in "([") - (character in ")]")
+        if depth == 0 and formula.startswith((" + ", " - ", " if ", " else "), place):
+            cuts.append(place)
+    terms = [formula[a:b].strip() for a, b in itertools.pairwise([*cuts, None])]
+    return [f"{left} = (", *(f"{indent}    {term}" for term in terms), f"{indent})"]
 
 
 def as_latex(model: Recurrence) -> str:

@@ -9,6 +9,7 @@ from sympy import log, sqrt
 
 from kfsheet import DataError, Recurrence, evaluate, python_source, t
 from kfsheet.exercises.football import football
+from kfsheet.show import as_python
 
 
 def test_a_run_is_a_frame_with_names_and_units():
@@ -21,13 +22,13 @@ def test_a_run_is_a_frame_with_names_and_units():
     assert {str(kind) for kind in frame.dtypes} == {"float64"}
 
 
-def test_the_generated_source_stands_alone_and_gives_the_same_numbers(tmp_path):
+def test_the_source_that_is_shown_stands_alone_and_gives_the_same_numbers(tmp_path):
     """Written to a file and run by a Python that cannot see kfsheet."""
     frame = evaluate(football)
     data = {c.name: list(c.values) for c in football.table.values() if c.is_data}
     script = tmp_path / "kick.py"
     call = f"columns, scalars = football(**{data!r})\nprint(columns['x_a'][-1], scalars['K_x'])\n"
-    script.write_text(f"{python_source(football)}\n\n{call}")
+    script.write_text(f"{as_python(football)}\n\n{call}")
     done = subprocess.run(
         [sys.executable, "-I", "-S", str(script)], capture_output=True, text=True, check=True
     )

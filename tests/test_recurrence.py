@@ -68,6 +68,15 @@ def test_two_columns_that_need_each_other_in_the_same_row_are_named(m):
         m.define(z[t], v[t] + 1, "m", "height")
 
 
+def test_a_circle_is_named_without_the_columns_that_only_lead_to_it(m):
+    a, b, c, d = m.columns("a_first", "b_done", "c_one", "d_two", section="Fall")
+    m.define(b[t], t, "", "needs nobody")
+    m.define(a[t], b[t] + c[t], "", "leads into the circle")
+    m.define(c[t], d[t] + b[t], "", "in the circle")
+    with pytest.raises(ModelError, match="within a row: c_one -> d_two -> c_one"):
+        m.define(d[t], c[t] + b[t], "", "closes the circle")
+
+
 def test_a_circle_through_a_summary_is_refused(m):
     v, z = m.table["v"].base, m.table["z"].base
     m.define(v[t], z[t] / 2, "m/s", "velocity")
