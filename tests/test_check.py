@@ -46,6 +46,13 @@ def test_changed_parameters_and_photos_are_told_and_still_hold(engine, damaged):
     assert report.changed == ["r_i 9 -> 900", "h 0.5 -> 0", "1 value of i"]
 
 
+@pytest.mark.parametrize("rows", [[4], [19], range(4, 20)], ids=["first", "last", "all"])
+def test_photos_may_be_missing_anywhere(engine, damaged, rows):
+    path = damaged({f"Reanalysis!{column}{row}": None for column in "CD" for row in rows})
+    report = check_workbook(path, exercise, engine)
+    assert report.holds, list(map(str, report.problems))
+
+
 @pytest.mark.parametrize(
     ("place", "damage"),
     [

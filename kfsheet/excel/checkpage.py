@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import isfinite, isnan
+from math import isfinite, isnan, nan
 
 from kfsheet.excel.compose import Page, Run, number_format, stored
 from kfsheet.excel.layout import Layout
@@ -68,12 +68,13 @@ def _column_probes(layout: Layout, column: Column, now: Run, built: Run) -> Iter
     what = "data" if column.is_data else "result"
     scale = _scale(rms(built.columns[name]))
     steps = layout.range("t", sheet)
+    bottom = f"{cells.split(':')[0].rsplit('$', 1)[0]}${layout.last_row}"
     mean_row = f"SUMPRODUCT({steps},{cells})/SUM({steps})"
     for quantity, formula, function in (
         ("root mean square", f"=SQRT(SUMSQ({cells})/COUNT({cells}))", rms),
         ("mean", f"=AVERAGE({cells})", mean),
         ("mean, weighted by step", f"={mean_row}", _weighted),
-        ("last row", f"={cells.split(':')[0].rsplit('$', 1)[0]}${layout.last_row}", last),
+        ("last row", f"={layout.last(name, bottom)}", last),
     ):
         if quantity == "mean, weighted by step" and layout.model.rows == 1:
             continue
@@ -126,13 +127,13 @@ def _put_verdict(page: Page, lines: list[Probe]) -> None:
         last_row = first + sum(p.what == kind for p in lines) - 1
         cells[kind] = f"G{first}:G{last_row}" if last_row >= first else ""
         first = last_row + 1
-    largest = max((p.difference for p in lines if p.what == "result"), default=0.0)
+    largest = _largest([p.difference for p in lines if p.what == "result"])
     changed = {
         kind: sum(not p.difference <= TOLERANCE for p in lines if p.what == kind) for kind in KINDS
     }
     figures = [
         ("verdict", verdict_formula(), verdict(changed, largest)),
-        ("largest relative difference", f"=MAX({cells['result']})", largest),
+        ("largest relative difference", f"=MAX({cells['result']})", stored(largest)),
         ("tolerance", TOLERANCE, None),
         ("parameters changed", _beyond(cells["parameter"]), changed["parameter"]),
         ("data figures changed", _beyond(cells["data"]), changed["data"]),
@@ -143,6 +144,11 @@ def _put_verdict(page: Page, lines: list[Probe]) -> None:
         shape = "0.0E+00" if row in (5, 6) else "0"
         page.put(row, 2, content, kind, stored=value, format=shape, scale=1.0)
     page.names["kfsheet_verdict"] = (4, 2)
+
+
+def _largest(differences: list[float]) -> float:
+    """As MAX has it: one that has no value leaves the whole without one."""
+    return nan if any(map(isnan, differences)) else max(differences, default=0.0)
 
 
 def verdict_formula() -> str:

@@ -73,6 +73,12 @@ class Layout:
         letter = get_column_letter(column)
         return f"{quote(home)}!${letter}${FIRST_ROW}:${letter}${self.last_row}"
 
+    def last(self, name: str, cell: str) -> str:
+        """Value of ``cell``, the last of a column; a bare reference to an empty cell would be 0."""
+        column = self.model.column(name)
+        gap = column.is_data and column.may_be_missing
+        return f'IF(ISNUMBER({cell}),{cell},"")' if gap else cell
+
     def formula(self, expression: Expr, sheet: str) -> Callable[[int], str]:
         """Formula of a row of ``sheet`` as a function of its row number, ``=`` included.
 
@@ -102,7 +108,8 @@ class _Names:
             self.depth = max(self.depth, back)
             return self._place(str(node.base.label)) + f"{{{back}}}"
         if isinstance(node, Last):
-            return self._place(str(node.args[0].label)) + str(self.layout.last_row)
+            name = str(node.args[0].label)
+            return self.layout.last(name, self._place(name) + str(self.layout.last_row))
         return self.layout.range(str(node.label)) if isinstance(node, IndexedBase) else None
 
     def _place(self, name: str) -> str:
