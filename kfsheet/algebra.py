@@ -63,6 +63,8 @@ class Analysis:
     @property
     def S_inverse(self) -> Matrix:
         """S^-1, m x m."""
+        if self.S.det().equals(0):
+            raise ModelError(f"S = R + H B H' has no inverse: {self.S}; is an error variance 0?")
         return _tidy(self.S.inv())
 
     @property
@@ -130,9 +132,9 @@ def analysis(
     if len(y) != m:
         raise ModelError(f"there are {m} observed quantities but {len(y)} observations")
     H = observed.jacobian(state)
-    if H.free_symbols & state.free_symbols:
-        raise ModelError(f"the operator {list(operator)} is not affine in {list(x_f)}")
     constant = simplify(observed - H * state)
+    if H.has(*state) or constant.has(*state):
+        raise ModelError(f"the operator {list(operator)} is not affine in {list(x_f)}")
     return Analysis(state, Matrix(B), Matrix(R), H, constant, Matrix(list(y)))
 
 

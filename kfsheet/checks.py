@@ -17,12 +17,14 @@ from sympy import (
     SympifyError,
     sympify,
 )
-from sympy.logic.boolalg import And, Not
+from sympy.logic.boolalg import And
 
-from kfsheet.errors import ModelError
+from kfsheet.errors import ModelError, PrintError
 from kfsheet.expressions import Aggregate, Observed, column_references, lag
+from kfsheet.pythoncode import python_code
 
-LARGEST_NUMBER, LARGEST_DENOMINATOR = 1000, 16
+LARGEST_NUMBER, LARGEST_DENOMINATOR = 12, 16
+FULL_CIRCLE = {60, 90, 180, 360}
 
 
 def checked_expression(name: str, expression: Any) -> Expr:
@@ -40,11 +42,30 @@ def checked_expression(name: str, expression: Any) -> Expr:
                 f"{name} holds the number {number}; make it a parameter, "
                 "so that it has a name, a unit and a place where it can be changed"
             )
+    _check_columns(name, expression)
+    try:
+        python_code(expression)
+    except PrintError as error:
+        raise ModelError(f"{name}: {error}") from None
     return expression
 
 
+def _check_columns(name: str, expression: Expr) -> None:
+    """Refuse a whole column where a cell is meant, and an aggregate of something else."""
+    for node in walk(expression):
+        columns = [a for a in node.args if isinstance(a, IndexedBase)]
+        if isinstance(node, Aggregate) and len(columns) < len(node.args):
+            raise ModelError(f"{name} reads {node}; an aggregate takes columns, as in Mean(x)")
+        whole = [] if isinstance(node, Aggregate | Indexed) else columns
+        if isinstance(expression, IndexedBase):
+            whole = [expression]
+        if whole:
+            raise ModelError(f"{name} reads {whole[0]}, a whole column; write {whole[0]}[t]")
+
+
 def _small(number: Rational) -> bool:
-    return abs(number.p) <= LARGEST_NUMBER and number.q <= LARGEST_DENOMINATOR
+    small = abs(number.p) <= LARGEST_NUMBER and number.q <= LARGEST_DENOMINATOR
+    return small or {abs(number.p), number.q} <= FULL_CIRCLE | {1}
 
 
 def _exact(number: Float) -> Expr:
@@ -76,10 +97,13 @@ def check_symbols(name: str, expression: Expr, known: Set[Basic]) -> None:
     for node in walk(expression):
         thing = node.base if isinstance(node, Indexed) else node
         if isinstance(thing, Symbol | IndexedBase) and thing not in known:
-            raise ModelError(
-                f"{name} reads {thing}, which is not defined; "
-                "add it with parameter(), data() or columns() first"
+            twin = any(str(thing) == str(other) for other in known)
+            remedy = (
+                "use the symbol that parameter(), derived() or columns() returned"
+                if twin
+                else "add it with parameter(), data() or columns() first"
             )
+            raise ModelError(f"{name} reads {thing}, which is not defined; {remedy}")
 
 
 def check_lags(name: str, expression: Expr, first_row: int, starts: int) -> None:
@@ -113,6 +137,8 @@ def _unguarded(e: Basic, known: frozenset, may_be_missing: Callable[[str], bool]
         return e if may_be_missing(str(e.base.label)) and e not in known else None
     if isinstance(e, Observed | Aggregate):
         return None
+    if isinstance(e, And):
+        known |= _seen(e)
     if not isinstance(e, Piecewise):
         return next(filter(None, (_unguarded(a, known, may_be_missing) for a in e.args)), None)
     for value, condition in e.args:
@@ -120,8 +146,7 @@ def _unguarded(e: Basic, known: frozenset, may_be_missing: Callable[[str], bool]
         culprit = culprit or _unguarded(value, known | _seen(condition), may_be_missing)
         if culprit is not None:
             return culprit
-        if isinstance(condition, Not):
-            known |= _seen(condition.args[0])
+        known |= _seen(~condition)
     return None
 
 
@@ -129,3 +154,12 @@ def _seen(condition: Basic) -> frozenset:
     """Cells that hold a number wherever the condition is true."""
     parts = condition.args if isinstance(condition, And) else (condition,)
     return frozenset(part.args[0] for part in parts if isinstance(part, Observed))
+
+
+def check_words(name: str, words: str) -> None:
+    """Refuse a title or description that would break a line of source or become a formula."""
+    if not words or words != " ".join(words.split()) or '"""' in words or words[0] in "=+-@":
+        raise ModelError(
+            f"{name}: the words {words!r} must be one line, not begin with = + - @ "
+            "and not hold triple quotes"
+        )

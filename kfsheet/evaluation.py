@@ -6,6 +6,7 @@ import linecache
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
+from math import isinf, nan
 from typing import TYPE_CHECKING, Any
 
 from kfsheet.errors import DataError
@@ -66,11 +67,16 @@ def run(
     """Columns, scalars and parameter values of one run, without pandas; see :func:`evaluate`."""
     values = checked_parameters(model, parameters or {})
     series = _checked_data(model, data or {})
-    function = _compiled(model, len(model.table), len(model.summaries))
+    function = _compiled(model, model.version)
     try:
         columns, scalars = function(**series, **values)
-    except (ArithmeticError, ValueError) as error:
+    except (ArithmeticError, ValueError, TypeError) as error:
         raise DataError(_explain(model, error)) from None
+    for name, column in columns.items():
+        for row, value in enumerate(column):
+            if isinstance(value, complex) or isinf(value):
+                raise DataError(f"{model.name}: {name} in row {row} is {value}, no finite number")
+    scalars = {name: nan if isinf(value) else value for name, value in scalars.items()}
     return columns, scalars, values
 
 
@@ -96,10 +102,10 @@ def _checked_data(model: Recurrence, given: Mapping[str, Any]) -> dict[str, list
 
 
 @lru_cache(maxsize=32)
-def _compiled(model: Recurrence, columns: int, summaries: int) -> Callable:
-    """The generated function. Definitions only ever grow, so their number is their version."""
+def _compiled(model: Recurrence, version: int) -> Callable:
+    """The generated function of one version of a model."""
     source = python_source(model)
-    filename = f"<kfsheet {model.name} {id(model)} {columns} {summaries}>"
+    filename = f"<kfsheet {model.name} {id(model)} {version}>"
     linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
     namespace: dict[str, Any] = {}
     exec(compile(source, filename, "exec"), namespace)  # source is printed by us, above
@@ -118,4 +124,7 @@ def _explain(model: Recurrence, error: Exception) -> str:
     name, _, formula = line.partition(" = ")
     row = frame.f_locals.get("t")
     where = name.replace("[t]", f" in row {row} ({model.step} {row})")
-    return f"{model.name}: {where} has no value: {error}, in {formula}"
+    reason = "it grows beyond 1e308" if isinstance(error, OverflowError) else error
+    if isinstance(error, TypeError):
+        reason = "a root or power of a negative number"
+    return f"{model.name}: {where} has no value: {reason}, in {formula}"

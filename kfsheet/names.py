@@ -14,9 +14,10 @@ LAST_ROW = 1_048_576
 RESERVED = frozenset(
     "t rows nan sqrt exp log sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh "
     "sign floor ceil abs min max pi observed present mean rms std total count largest smallest "
-    "last sumproduct isnan fsum range len zip model data members executor".split()
+    "last sumproduct isnan fsum range len zip dict columns scalars model data "
+    "members executor".split()
 )
-OWN_SHEETS = ("Read me", "Parameters", "Charts", "Check")
+OWN_SHEETS = ("Read me", "Parameters", "Charts", "Check", "History")
 FORBIDDEN_IN_SHEETS = set("[]:*?/\\'{}!")
 
 
@@ -26,7 +27,7 @@ def name_problem(name: str) -> str | None:
         return "a name is a letter followed by letters, digits and underscores"
     if keyword.iskeyword(name):
         return "this is a word of the Python language"
-    if name in RESERVED:
+    if name in RESERVED or name.startswith("kfsheet"):
         return "kfsheet uses this name itself"
     return None
 
@@ -51,7 +52,7 @@ def _column(letters: str) -> int:
 
 def section_problem(name: str, others: Collection[str]) -> str | None:
     """Why a worksheet cannot be called ``name`` beside ``others``; None if it can."""
-    if not name or len(name) > 31:
+    if not name.strip() or len(name) > 31:
         return "the name of a worksheet has 1 to 31 characters"
     if bad := FORBIDDEN_IN_SHEETS & set(name):
         return f"the name of a worksheet cannot contain {' '.join(sorted(bad))}"

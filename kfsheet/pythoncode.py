@@ -150,6 +150,8 @@ def _wrapped(text: str) -> list[str]:
 def _row_lines(model: Recurrence, step: Pass) -> list[str]:
     """The start rows one by one, then the loop; a start row that fits into the loop goes there."""
     general = step.rows[-1]
+    if not general:
+        return []
     alone = len(step.rows) - 1
     while alone > 1 and _fits(general, step.rows[alone - 1], alone - 1):
         alone -= 1

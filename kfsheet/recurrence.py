@@ -15,7 +15,7 @@ from sympy import Basic, Expr, Indexed, IndexedBase, Symbol
 
 from kfsheet import checks
 from kfsheet.errors import DataError, ModelError
-from kfsheet.expressions import Missing, column_references, t
+from kfsheet.expressions import Aggregate, Last, Missing, column_references, t
 from kfsheet.names import excel_name_problem, name_problem, section_problem
 from kfsheet.parts import Column, Parameter, Scalar, checked_values
 from kfsheet.schedule import Pass, schedule
@@ -53,6 +53,8 @@ class Recurrence:
     def __init__(self, name: str, *, title: str, step: str = "step", rows: int | None = None):
         if problem := name_problem(name):
             raise ModelError(f"recurrence {name!r}: {problem}")
+        for words in (title, step):
+            checks.check_words(name, words)
         if rows is not None and (not isinstance(rows, int) or rows < 1):
             raise ModelError(f"recurrence {name}: rows is {rows!r}; give a whole number from 1 up")
         self.name, self.title, self.step = name, title, step
@@ -95,6 +97,7 @@ class Recurrence:
         if sign not in ("", "positive", "nonnegative"):
             raise ModelError(f"parameter {name}: sign is {sign!r}, not positive or nonnegative")
         self._check_scalar_name(name)
+        checks.check_words(name, description)
         parse_unit(unit)
         symbol = Symbol(name, real=True, **({sign: True} if sign else {}))
         new = Parameter(symbol, value, unit, description, sign)
@@ -104,7 +107,8 @@ class Recurrence:
     def derived(self, name: str, expression: Expr, unit: str, description: str) -> Symbol:
         """Add a scalar that is a formula of parameters and earlier scalars; see ``parameter``."""
         expression = self._checked(name, expression)
-        if checks.columns_read(expression) or t in checks.scalars(expression):
+        read = checks.scalars(expression) & {s.symbol for s in self.summaries.values()}
+        if checks.columns_read(expression) or t in checks.scalars(expression) or read:
             raise ModelError(f"derived scalar {name} reads a column; make it a summary or a column")
         return self._add_scalar(self.derived_scalars, name, expression, unit, description)
 
@@ -135,6 +139,7 @@ class Recurrence:
             If a value is no number, is infinite, or is missing where that is not allowed, or the
             column has another length than the table.
         """
+        checks.check_words(name, description)
         parse_unit(unit)
         numbers = checked_values(name, values, may_be_missing)
         if self._rows not in (None, len(numbers)):
@@ -184,11 +189,13 @@ class Recurrence:
             ``when_observed``, a number that should be a parameter, or a unit that does not parse.
         """
         column = self._definable(cell)
+        checks.check_words(column.name, description)
         parse_unit(unit)
         rules = tuple(self._checked(column.name, rule) for rule in (*start, expression))
         for row, rule in enumerate(rules):
             checks.check_lags(column.name, rule, row, len(start))
             checks.check_observed(column.name, rule, self._may_be_missing)
+            self._check_summaries(column.name, rule)
         new = replace(
             column,
             unit=unit,
@@ -226,6 +233,12 @@ class Recurrence:
         for column in self.table.values():
             result.setdefault(column.section, []).append(column)
         return result
+
+    @property
+    def version(self) -> int:
+        """How many things are defined; it only grows, so it tells whether anything was added."""
+        defined = sum(bool(c.rules) or c.is_data for c in self.all_columns())
+        return len(self._scalars()) + defined
 
     @property
     def start_rows(self) -> int:
@@ -284,7 +297,10 @@ class Recurrence:
             Empty if all expressions are sound.
         """
         known = {**self.units(), **(units or {})}
-        walker = UnitWalker(known, {**self.defaults(), **(values or {})})
+        numbers = {**self.defaults(), **(values or {})}
+        for scalar in self.derived_scalars.values():
+            numbers[scalar.name] = scalar.expression.subs(numbers)
+        walker = UnitWalker(known, numbers)
         problems = []
         for item in [*self.derived_scalars.values(), *self.all_columns(), *self.summaries.values()]:
             reasons = (walker.problem(rule, known[item.name]) for rule in reversed(item.rules))
@@ -298,6 +314,7 @@ class Recurrence:
         self, home: dict[str, Scalar], name: str, expression: Expr, unit: str, description: str
     ) -> Symbol:
         self._check_scalar_name(name)
+        checks.check_words(name, description)
         parse_unit(unit)
         symbol = Symbol(name, real=True)
         home[name] = Scalar(symbol, expression, unit, description)
@@ -315,7 +332,7 @@ class Recurrence:
         return {**self.parameters, **self.derived_scalars, **self.summaries}
 
     def _taken(self, name: str) -> str | None:
-        taken = name in self._scalars() or name in self.table or name == "time"
+        taken = name in self._scalars() or name in self.table or name in ("time", self.step)
         return "the name is taken" if taken else None
 
     def _checked(self, name: str, expression: Expr) -> Expr:
@@ -334,6 +351,16 @@ class Recurrence:
         if column.is_data or column.expression is not None:
             raise ModelError(f"column {column.name} is defined already")
         return column
+
+    def _check_summaries(self, name: str, rule: Expr) -> None:
+        """Refuse an aggregate inside a column, and a summary that may have no value."""
+        if rule.has(Aggregate):
+            raise ModelError(f"{name} holds an aggregate; make it a summary() and read that")
+        for symbol in checks.scalars(rule):
+            summary = self.summaries.get(symbol.name)
+            for last in summary.expression.atoms(Last) if summary else ():
+                if self._may_be_missing(str(last.args[0].label)):
+                    raise ModelError(f"{name} reads {symbol}, which may be missing in the last row")
 
     def _may_be_missing(self, name: str) -> bool:
         return self.column(name).may_be_missing

@@ -64,6 +64,8 @@ def parse_unit(text: str) -> Quantity:
         raise ModelError(
             f"the unit {text!r} does not parse ({error}); write it like m, px, m/s2, 1/s, or ''"
         ) from None
+    if not quantity._is_multiplicative:
+        raise ModelError(f"the unit {text!r} has an offset; use K, or a difference in delta_degC")
     if quantity.magnitude != 1:
         raise ModelError(f"the unit {text!r} holds a number; a unit is like m, px, m/s2 or 1/s")
     return quantity
@@ -144,7 +146,10 @@ class UnitWalker:
             return self.of(e.args[0])
         if isinstance(e, SumProduct):
             return self._product(e)
-        if isinstance(e, Count | sign):
+        if isinstance(e, Count):
+            return self.none
+        if isinstance(e, sign):
+            self.of(e.args[0])
             return self.none
         if isinstance(e, Aggregate):
             return self.of(e.args[0])
@@ -169,7 +174,11 @@ class UnitWalker:
         base = self.of(e.base)
         if base is None or (base.unitless and self.same(base, self.none)):
             return base
-        exponent = e.exp.subs({s: self.values[s.name] for s in e.exp.free_symbols})
+        known = {s: self.values[s.name] for s in e.exp.free_symbols if str(s) in self.values}
+        exponent = e.exp.subs(known)
+        if not exponent.is_number:
+            text = python_code(e)
+            raise _DisagreementError(f"{text} has no unit: its exponent differs from row to row")
         return base ** float(exponent)
 
     def condition(self, e: Boolean) -> None:

@@ -59,6 +59,8 @@ def test_the_environment_holds_every_pin_of_the_project():
 
 def test_the_project_speaks_of_itself_alone():
     """No machine paths, no registry hosts, in any file that git knows."""
+    if not (ROOT / ".git").exists():
+        pytest.skip("not a git checkout: which files belong to the project is not known")
     names = subprocess.run(
         ["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True
     ).stdout.splitlines()

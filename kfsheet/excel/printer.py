@@ -36,8 +36,8 @@ AGGREGATES = {
     "Std": "STDEV({0})",
     "Sum": "SUM({0})",
     "Count": "COUNT({0})",
-    "Largest": "MAX({0})",
-    "Smallest": "MIN({0})",
+    "Largest": 'IF(COUNT({0})>0,MAX({0}),"")',
+    "Smallest": 'IF(COUNT({0})>0,MIN({0}),"")',
     "SumProduct": "SUMPRODUCT({0},{1})",
 }
 HARD_LIMIT = 255
