@@ -17,7 +17,7 @@ from sympy import (
     SympifyError,
     sympify,
 )
-from sympy.logic.boolalg import And
+from sympy.logic.boolalg import And, Not, Or
 
 from kfsheet.errors import ModelError, PrintError
 from kfsheet.expressions import Aggregate, Observed, column_references, lag
@@ -146,7 +146,7 @@ def _unguarded(e: Basic, known: frozenset, may_be_missing: Callable[[str], bool]
         culprit = culprit or _unguarded(value, known | _seen(condition), may_be_missing)
         if culprit is not None:
             return culprit
-        known |= _seen(~condition)
+        known |= _seen_otherwise(condition)
     return None
 
 
@@ -154,6 +154,12 @@ def _seen(condition: Basic) -> frozenset:
     """Cells that hold a number wherever the condition is true."""
     parts = condition.args if isinstance(condition, And) else (condition,)
     return frozenset(part.args[0] for part in parts if isinstance(part, Observed))
+
+
+def _seen_otherwise(condition: Basic) -> frozenset:
+    """Cells that hold a number wherever the condition is false."""
+    parts = condition.args if isinstance(condition, Or) else (condition,)
+    return frozenset().union(*(_seen(part.args[0]) for part in parts if isinstance(part, Not)))
 
 
 def check_words(name: str, words: str) -> None:

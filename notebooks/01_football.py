@@ -110,7 +110,8 @@ with pd.option_context("display.max_colwidth", None):
 
 # %% [markdown]
 # Does the sheet compute what NumPy computes? An independent spreadsheet engine recalculates the
-# workbook from nothing, twice: as it stands, and with every input moved by one percent.
+# workbook from nothing: as it stands, with every input moved by one percent, and with photos
+# taken out.
 
 # %%
 report = kf.check_workbook("../workbooks/football.xlsx", exercise)

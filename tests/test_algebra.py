@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from sympy import Matrix, Symbol, diag, lambdify, simplify, symbols, zeros
+from sympy import Matrix, Piecewise, Symbol, diag, lambdify, simplify, symbols, zeros
 
 from kfsheet import analysis, correlated_covariance, diagonal_analysis, gain_limits, sequential_gain
 from kfsheet.errors import ModelError
@@ -103,6 +103,11 @@ def test_observations_one_after_the_other_equal_the_joint_update():
         (lambda: analysis([x], [a * x], [i, j], diag(b_x), diag(r_i)), "1 observed"),
         (lambda: analysis([x, z], [x], [i], diag(b_x), diag(r_i)), "2 x 2"),
         (lambda: analysis([x, z], [x], [i], Matrix([[1, 2], [3, 4]]), diag(r_i)), "symmetric"),
+        (
+            lambda: analysis([x], [Piecewise((1, x > 0), (0, True))], [i], diag(b_x), diag(r_i)),
+            "not",
+        ),
+        (lambda: analysis([x], [a * x], [i], diag(0), diag(0)).K, "no inverse"),
         (lambda: diagonal_analysis(0), "whole number from 1"),
         (lambda: sequential_gain(diag(b_x), Matrix([[1, 2]]), r_i), "1 x 1"),
     ],

@@ -63,7 +63,7 @@ def test_photos_may_be_missing_anywhere(engine, damaged, rows):
         ("Reanalysis!G9", lambda f: f.replace("K8", "K7")),
         ("Reanalysis!K9", lambda f: f.replace("G9", "G8")),
         ("Free run!E11", lambda f: f.replace("E10", "E9")),
-        ("Goal line!F12", lambda f: f.replace("/2", "")),
+        ("Goal line!G12", lambda f: f.replace("/2", "")),
         ("Reanalysis!G9", 14.722150819752194),  # a number typed over the formula, still right
         ("Reanalysis!G9", lambda f: f.replace("dt*", "0.1*", 1)),  # ... or into it
         ("Reanalysis!K9", lambda f: f.replace("K_x", "0.01548898950112839")),
@@ -74,6 +74,8 @@ def test_photos_may_be_missing_anywhere(engine, damaged, rows):
         ("Check!D50", lambda f: f + "+1"),
         ("Reanalysis!A9", 99),  # the step index
         ("Reanalysis!I4", 5),  # a value where there is none
+        ("Reanalysis!K9", "=G9+K_x*I9"),  # no longer asks whether there is an innovation
+        ("Reanalysis!I12", "=C12-a*G12"),  # ... or a photo
     ],
 )
 def test_one_damaged_cell_is_reported_and_no_other(damaged, place, damage):
@@ -179,6 +181,36 @@ def test_inputs_that_cannot_be_used_are_named_by_cell(damaged, changes, message)
 def test_a_workbook_that_lost_its_shape_is_refused(damaged, changes, message):
     with pytest.raises(WorkbookError, match=message):
         check_workbook(damaged(changes), exercise)
+
+
+def test_a_name_that_leads_elsewhere_and_a_second_header_are_refused(football_file, tmp_path):
+    path = tmp_path / "moved.xlsx"
+    book = openpyxl.load_workbook(football_file)
+    book.defined_names["r_i"].attr_text = "Parameters!$B$13"
+    book.save(path)
+    with pytest.raises(WorkbookError, match="r_i leads to Parameters!B13, which is not labelled"):
+        check_workbook(path, exercise)
+    book = openpyxl.load_workbook(football_file)
+    book["Reanalysis"]["N1"] = "x_f"
+    book.save(path)
+    with pytest.raises(WorkbookError, match="two columns 'x_f'"):
+        check_workbook(path, exercise)
+
+
+def test_a_comment_in_a_cell_does_not_disturb(engine, football_file, tmp_path):
+    book = openpyxl.load_workbook(football_file)
+    book["Reanalysis"]["K9"].comment = openpyxl.comments.Comment("why?", "a student")
+    book.save(tmp_path / "comment.xlsx")
+    assert check_workbook(tmp_path / "comment.xlsx", exercise, engine).holds
+
+
+def test_a_workbook_with_a_damaged_stream_is_refused(football_file, tmp_path):
+    content = bytearray(football_file.read_bytes())
+    content[2000:6000] = bytes(4000)
+    (tmp_path / "torn.xlsx").write_bytes(content)
+    for call in (open_workbook, recalculate):
+        with pytest.raises(WorkbookError, match="not a workbook"):
+            call(tmp_path / "torn.xlsx")
 
 
 def test_a_sheet_or_a_name_that_is_gone_is_named(football_file, tmp_path):

@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 import pytest
-from sympy import log, sqrt
+from sympy import Rational, exp, log, sqrt
 
 from kfsheet import DataError, Recurrence, evaluate, python_source, t
 from kfsheet.exercises.football import football
@@ -65,6 +65,23 @@ def test_the_generated_source_reads_like_the_printed_equations():
 def test_what_cannot_be_computed_is_refused_by_name(data, parameters, message):
     with pytest.raises(DataError, match=message):
         evaluate(football, data, **parameters)
+
+
+@pytest.mark.parametrize(
+    ("rule", "message"),
+    [
+        (lambda k: (k - 9) ** Rational(1, 3), "q in row 0 is .*no finite number"),
+        (lambda k: k * (k + 1) * (k + 2) * (k + 3), "no finite number"),
+        (lambda k: exp(k), "grows beyond 1e308"),
+    ],
+)
+def test_values_that_are_not_finite_and_real_are_refused(rule, message):
+    m = Recurrence("wild", title="Values beyond doubles", rows=2)
+    k = m.parameter("k", 1, "", "factor")
+    (q,) = m.columns("q", section="S")
+    m.define(q[t], rule(k), "", "wild")
+    with pytest.raises(DataError, match=message):
+        evaluate(m, k=1e100 if message != "q in row 0 is .*no finite number" else 1)
 
 
 def test_a_formula_without_a_value_is_named_with_its_row():

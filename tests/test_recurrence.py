@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from sympy import Float, Piecewise, Rational, Symbol, exp, pi, sin, sqrt
+from sympy import Float, Or, Piecewise, Rational, Symbol, exp, gamma, pi, sign, sin, sqrt
 
 from kfsheet import (
     RMS,
@@ -49,6 +49,13 @@ def parts(m):
         (lambda dt, g, obs, v, z: v[t - 1] + obs[t], "obs.*may be missing; write when_observed"),
         (lambda dt, g, obs, v, z: v[t - 1] - Float(9.81) * dt, "make it a parameter"),
         (lambda dt, g, obs, v, z: v[t - 1] * 86_400, "make it a parameter"),
+        (lambda dt, g, obs, v, z: v[t - 1] - 44, "make it a parameter"),
+        (lambda dt, g, obs, v, z: 2 * z, r"a whole column; write z\[t\]"),
+        (lambda dt, g, obs, v, z: z[t] - Mean(z), r"make it a summary\(\)"),
+        (lambda dt, g, obs, v, z: z[t] - Mean(2 * z), "an aggregate takes columns"),
+        (lambda dt, g, obs, v, z: gamma(dt), "no function gamma"),
+        (lambda dt, g, obs, v, z: Piecewise((1, z[t] > 0)), "otherwise"),
+        (lambda dt, g, obs, v, z: v[t - 1] * Symbol("dt"), "use the symbol that parameter"),
         (lambda dt, g, obs, v, z: v[t - 1] > 0, "no number in a row"),
         (lambda dt, g, obs, v, z: "v[t-1]", "give a SymPy expression"),
     ],
@@ -179,6 +186,39 @@ def test_a_guard_covers_exactly_the_cells_it_asks_for(m):
     assert evaluate(m)["v"].tolist() == [0.5, 0, 1.5, 2]
 
 
+def test_a_guard_may_ask_for_two_cells_in_either_way(m):
+    dt, g, obs, v, z = parts(m)
+    m.define(z[t], when_observed(obs[t], obs[t]), "m", "copy")
+    neither = Or(~Observed(obs[t]), ~Observed(z[t]))
+    m.define(v[t], Piecewise((0, neither), (obs[t] + z[t], True)), "m", "sum")
+    assert evaluate(m)["v"].tolist() == [2, 0, 6, 8]
+
+
+def test_columns_of_data_and_a_summary_need_no_pass_of_their_own():
+    m = Recurrence("centred", title="Data without their mean")
+    x = m.data("x", [1.0, 2.0, 6.0], "m", "data", section="S")
+    (y,) = m.columns("y", section="S")
+    mean_x = m.summary("mean_x", Mean(x), "m", "mean")
+    m.define(y[t], x[t] - mean_x, "m", "centred")
+    assert evaluate(m)["y"].tolist() == [-2, -1, 3]
+
+
+def test_what_is_added_after_a_run_is_in_the_next_run():
+    m = Recurrence("grows", title="A model that grows", rows=2)
+    (y,) = m.columns("y", section="S")
+    m.define(y[t], t, "", "ramp")
+    evaluate(m)
+    q = m.parameter("q", 2, "", "late")
+    m.derived("q_twice", 2 * q, "", "later")
+    assert evaluate(m, q=3).attrs["scalars"]["q_twice"] == 6
+
+
+@pytest.mark.parametrize("words", ["", "=1+1", "two\nlines", 'a """ b', "@mention"])
+def test_words_that_would_break_source_or_become_a_formula_are_refused(m, words):
+    with pytest.raises(ModelError, match="the words"):
+        m.parameter("k", 1, "", words)
+
+
 def test_halves_may_be_written_as_decimals(m):
     dt, g, obs, v, z = parts(m)
     m.define(v[t], v[t - 1] - 0.5 * g * dt, "m/s", "velocity", start=[0])
@@ -217,7 +257,9 @@ def test_the_unit_check_walks_every_kind_of_node(m):
     assert m.check_units() == []
     for name, expression, reason in [
         ("w1", exp(k), "argument of exp, k, is in 1/s"),
-        ("w2", g ** (k * dt) + g, "m"),
+        ("w2", g ** (k * dt) + g, "is in m/s², not in no unit"),
+        ("w5", sign(g + k), "g is in m/s² but k is in 1/s"),
+        ("w6", g**t, "its exponent differs from row to row"),
         ("w3", Piecewise((1, g > k), (0, True)), "g is in m/s² but k is in 1/s"),
         ("w4", sin(d), "argument of sin, d, is in deg"),
     ]:

@@ -1,8 +1,9 @@
 """Does a workbook compute what NumPy computes, from the parameters and data that stand in it?
 
-The file is recalculated from nothing, twice: as it stands, and with every parameter and datum
-moved by about one percent. The second time finds a number typed over a formula, or a parameter's
-value typed into one, even while it is still right.
+The file is recalculated from nothing, as it stands and three times more: with every parameter and
+datum moved by about one percent, which finds a number typed over a formula, or a parameter's value
+typed into one, even while it is still right; and with half of the observations taken out, then
+with the other half, which finds a formula that no longer asks whether there is one.
 
 What "agrees" means, and how the cell that is wrong is told from those that follow from it, stands
 in :mod:`kfsheet.excel.compare`.
@@ -100,13 +101,13 @@ def check_workbook(path: str | Path, exercise: Exercise, engine: str = "ironcalc
 
     first = compare(values, inputs.data, inputs.parameters)
     found, differing = first.problems, set(first.differing)
-    changes, data, parameters = _nudged(inputs)
-    try:
-        second = compare(recalculate(path, engine, changes), data, parameters)
-        moved = {a: f"{reason} (inputs moved by 1 %)" for a, reason in second.problems.items()}
-        found, differing = {**moved, **found}, differing | set(second.differing)
-    except DataError:
-        pass  # the model has no value one percent away; the first comparison has to do
+    for words, (changes, data, parameters) in _trials(inputs):
+        try:
+            trial = compare(recalculate(path, engine, changes), data, parameters)
+        except DataError:
+            continue  # the model has no value there; the other comparisons have to do
+        told = {address: f"{reason} ({words})" for address, reason in trial.problems.items()}
+        found, differing = {**told, **found}, differing | set(trial.differing)
     return Report(
         path,
         engine,
@@ -127,6 +128,21 @@ def _changed(inputs: Inputs, built: Run) -> Iterator[str]:
         before = [None if math.isnan(value) else value for value in built.columns[name]]
         if count := sum(a != b for a, b in zip(series, before, strict=True)):
             yield f"{count} value{'s' * (count > 1)} of {name}"
+
+
+def _trials(inputs: Inputs) -> Iterator[tuple[str, tuple[Changes, Data, dict[str, float]]]]:
+    """Other inputs to calculate with, and what was done to them."""
+    changes, data, parameters = _nudged(inputs)
+    yield "inputs moved by 1 %", (changes, data, parameters)
+    optional = [n for n in data if inputs.layout.model.table[n].may_be_missing]
+    for half in (0, 1) if optional else ():
+        emptied = {sheet: dict(cells) for sheet, cells in changes.items()}
+        fewer = {name: list(series) for name, series in data.items()}
+        for number, name in enumerate(optional):
+            for row, (sheet, *cell) in enumerate(inputs.cells(name)):
+                if (row + number) % 2 == half:
+                    fewer[name][row] = emptied.setdefault(sheet, {})[tuple(cell)] = None
+        yield "half of the observations taken out", (emptied, fewer, parameters)
 
 
 def _nudged(inputs: Inputs) -> tuple[Changes, Data, dict[str, float]]:

@@ -17,6 +17,10 @@ from kfsheet.numerics import last, mean, rms, total
 from kfsheet.parts import Column
 
 TOLERANCE = 1e-9
+LIVE_OR_NOT = (
+    "Live figures beside those frozen when the file was built. LibreOffice shows the values that "
+    "are stored in a file until it is told to calculate: press Ctrl+Shift+F9."
+)
 TABLE_ROW = 11
 KINDS = ("parameter", "data", "result")
 PASS, FAIL, PARAMETERS, DATA = "PASS", "FAIL", "parameters changed", "data changed"
@@ -97,7 +101,7 @@ def check_page(layout: Layout, now: Run, built: Run) -> Page:
     page = Page("Check", widths={1: 22, 2: 12, 3: 26, 4: 22, 5: 22, 6: 16, 7: 14})
     page.freeze = f"A{TABLE_ROW + 1}"
     page.put(1, 1, "Does this program compute what kfsheet computed?", "title")
-    page.put(2, 1, "Live figures beside those frozen when the file was built.")
+    page.put(2, 1, LIVE_OR_NOT)
     heads = ("name", "kind", "figure", "now", "at build", "scale", "difference")
     for n, word in enumerate(heads, 1):
         page.put(TABLE_ROW, n, word, "header", align="center")

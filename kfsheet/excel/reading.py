@@ -57,12 +57,21 @@ def layout_of(book: Workbook, exercise: Exercise, path: Path) -> Layout:
         If a sheet, a column or a name is gone.
     """
     model = exercise.model
+    for sheet in ("Charts", "Check"):
+        if sheet not in book.sheetnames:
+            raise WorkbookError(f"{path}: the sheet {sheet!r} is gone or renamed")
     columns = {section: _columns_of(book, model, section, path) for section in model.sections}
     scalars = {}
     for name in (*model.parameters, *model.derived_scalars, *model.summaries):
         address = _named(book, name)
         if address is None:
             raise WorkbookError(f"{path}: no cell is named {name}; build the workbook anew")
+        sheet, row, column = address
+        if column == 1 or book[sheet].cell(row, column - 1).value != name:
+            raise WorkbookError(
+                f"{path}: the name {name} leads to {place(address)}, which is not labelled {name}; "
+                "move the name or the cell back"
+            )
         scalars[name] = address
     return Layout(model, columns, scalars)
 
@@ -70,7 +79,8 @@ def layout_of(book: Workbook, exercise: Exercise, path: Path) -> Layout:
 def _columns_of(book: Workbook, model: Recurrence, section: str, path: Path) -> dict[str, int]:
     if section not in book.sheetnames:
         raise WorkbookError(f"{path}: the sheet {section!r} is gone or renamed")
-    found = {cell.value: cell.column for cell in book[section][SYMBOL_ROW]}
+    headers = [cell.value for cell in book[section][SYMBOL_ROW]]
+    found = {value: column for column, value in enumerate(headers, 1)}
     keys = {"t": model.step, **({"time": "time"} if model.clock else {})}
     keys |= {column.name: column.name for column in model.sections[section]}
     if missing := [header for header in keys.values() if header not in found]:
@@ -78,6 +88,8 @@ def _columns_of(book: Workbook, model: Recurrence, section: str, path: Path) -> 
             f"{path}: sheet {section!r} has no column {missing[0]!r} in row {SYMBOL_ROW}; "
             "leave the header row as it was"
         )
+    if twins := [header for header in keys.values() if headers.count(header) > 1]:
+        raise WorkbookError(f"{path}: sheet {section!r} has two columns {twins[0]!r}; rename one")
     return {key: found[header] for key, header in keys.items()}
 
 

@@ -12,6 +12,7 @@ import subprocess
 import tempfile
 import warnings
 import zipfile
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from xml.etree.ElementTree import ParseError
@@ -36,11 +37,14 @@ EMPTY = re.compile(rb'(<(?:\w+:)?c\s[^>]*?)\s+t="n"(\s*/>)')
 ADDRESS = re.compile(rb'\sr="([A-Z]+\d+)"')
 MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
 LINKS = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
+# IronCalc 0.9.1 cannot load the comments that openpyxl writes; no formula needs them.
+COMMENTS = re.compile(rb'<Relationship\b[^>]*/(?:comments|vmlDrawing)"[^>]*/>')
+DRAWING = re.compile(rb"<legacyDrawing\b[^>]*/>")
 HAS_FORMULA = re.compile(rb"<(?:\w+:)?f\b")
 
 
-Changes = dict[str, dict[tuple[int, int], float]]
-"""Numbers to put into cells before calculating, by sheet and (row, column)."""
+Changes = dict[str, dict[tuple[int, int], float | None]]
+"""Numbers to put into cells before calculating, by sheet and (row, column); None empties one."""
 
 
 def recalculate(
@@ -89,6 +93,7 @@ def open_workbook(path: str | Path, *, data_only: bool = False) -> openpyxl.Work
     except (
         InvalidFileException,
         zipfile.BadZipFile,
+        zlib.error,
         ParseError,
         KeyError,
         ValueError,
@@ -115,10 +120,20 @@ def strip_values(path: str | Path, copy: str | Path, changes: Changes | None = N
                 content = old.read(item)
                 if re.fullmatch(r"xl/worksheets/[^/]+\.xml", item.filename):
                     content = _strip(content, new_numbers.get(item.filename, {}))
+                    content = DRAWING.sub(b"", content)
+                elif item.filename.startswith("xl/worksheets/_rels/"):
+                    content = COMMENTS.sub(b"", content)
                 new.writestr(item.filename, content)
     except OSError as error:
         raise WorkbookError(f"{path} cannot be read: {error.strerror or error}") from None
-    except (zipfile.BadZipFile, zipfile.LargeZipFile, EOFError, KeyError, ParseError) as error:
+    except (
+        zipfile.BadZipFile,
+        zipfile.LargeZipFile,
+        zlib.error,
+        EOFError,
+        KeyError,
+        ParseError,
+    ) as error:
         raise WorkbookError(f"{path} is not a workbook (.xlsx): {error}") from None
 
 
@@ -134,15 +149,16 @@ def _parts(archive: zipfile.ZipFile) -> dict[str, str]:
     }
 
 
-def _strip(xml: bytes, numbers: dict[tuple[int, int], float]) -> bytes:
-    new = {f"{get_column_letter(c)}{r}".encode(): repr(v) for (r, c), v in numbers.items()}
+def _strip(xml: bytes, numbers: dict[tuple[int, int], float | None]) -> bytes:
+    new = {f"{get_column_letter(c)}{r}".encode(): v for (r, c), v in numbers.items()}
 
     def cell(match: re.Match[bytes]) -> bytes:
         tag, attributes, inside = match.groups()
         address = ADDRESS.search(attributes)
         if address and address[1] in new:
-            value = new[address[1]].encode()
-            return b"<%s%s><v>%s</v></%s>" % (tag, TYPE.sub(b"", attributes), value, tag)
+            value = new[address[1]]
+            content = b"" if value is None else b"<v>%s</v>" % repr(value).encode()
+            return b"<%s%s>%s</%s>" % (tag, TYPE.sub(b"", attributes), content, tag)
         if not HAS_FORMULA.search(inside):
             return match[0]
         # An empty value, not none at all: IronCalc reports a formula that lacks the element.

@@ -46,7 +46,7 @@ def _run_file(path: Path) -> object:
     sys.modules[name] = module
     try:
         specification.loader.exec_module(module)
-    except Exception as error:  # whatever a user's file raises is told in one line
+    except (Exception, SystemExit) as error:  # whatever a user's file raises is told in one line
         lines = [f for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path)]
         number = getattr(error, "lineno", None) or (lines[-1].lineno if lines else "?")
         kind = "" if isinstance(error, ModelError) else f"{type(error).__name__}: "

@@ -9,16 +9,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sympy import Expr, Piecewise, diag, sign, sqrt
+from sympy import Abs, Expr, Piecewise, diag, sign, sqrt
 
 from kfsheet.algebra import analysis
 from kfsheet.charts import Chart, Series
+from kfsheet.errors import DataError
 from kfsheet.exercise import Exercise, Question
 from kfsheet.expressions import RMS, Last, Mean, Missing, Std, t, when_observed
 from kfsheet.recurrence import Recurrence
 from kfsheet.tables import read_table
 
 DATA = Path(__file__).parent / "data"
+STEP = 0.1  # s, between two photos
 
 
 def build_model(
@@ -43,9 +45,11 @@ def build_model(
     photos = read_table(camera, ("photo", "t", "i", "j"), times="t", may_be_missing=("i", "j"))
     flight = read_table(truth, ("photo", "t", "x", "z"), times="t")
 
+    _check_times(camera, photos, truth, flight)
+
     m = Recurrence("football", title="Reanalysis of a football kick", step="photo")
 
-    dt = m.parameter("dt", 0.1, "s", "time between two photos", sign="positive")
+    dt = m.parameter("dt", STEP, "s", "time between two photos", sign="positive")
     g = m.parameter("g", 9.80665, "m/s2", "gravity")
     f = m.parameter("f", 0.03, "s/m", "friction (the unit is the source's)", sign="nonnegative")
     a = m.parameter("a", 44.2, "px/m", "pixels per metre", sign="positive")
@@ -169,8 +173,8 @@ def build_model(
         m.define(high[t], 2 * sigma, "px", f"band of {d}: +2 sigma")
 
     page = "Goal line"
-    u_next, w_next, wait, z_goal, slope, s_goal = m.columns(
-        "u_next", "w_next", "wait", "z_goal", "slope", "s_goal", section=page
+    u_next, w_next, wait, s_wait, z_goal, slope, s_goal = m.columns(
+        "u_next", "w_next", "wait", "s_wait", "z_goal", "slope", "s_goal", section=page
     )
     step_x = (x_a[t] - x_a[t - 1]) / dt - friction(u[t]) * dt
     step_z = (z_a[t] - z_a[t - 1]) / dt - friction(w[t]) * dt - g * dt
@@ -195,17 +199,36 @@ def build_model(
     slope_then = (w_next[t] + g * (dt / 2 - wait[t])) / u_next[t]
     m.define(slope[t], when_observed(wait[t], slope_then), "", "slope of the path at the goal line")
     # Error propagation: x_a and z_a of this photo and of the one before, taken as independent.
+    # Their errors are in fact positively correlated, so both spreads are on the safe side.
     spread = (1 + wait[t] / dt) ** 2 + (wait[t] / dt) ** 2
+    m.define(
+        s_wait[t],
+        when_observed(wait[t], sqrt(spread * p_x) / Abs(u_next[t])),
+        "s",
+        "standard deviation of wait, as if analyses erred independently",
+    )
     m.define(
         s_goal[t],
         when_observed((wait[t], slope[t]), sqrt(spread * (p_z + slope[t] ** 2 * p_x))),
         "m",
-        "standard deviation of z_goal",
+        "standard deviation of z_goal, as if analyses erred independently",
     )
     m.summary("goal_wait", Last(wait), "s", "goal line: time after the last photo")
+    m.summary("goal_wait_sigma", Last(s_wait), "s", "goal line: standard deviation of that time")
     m.summary("goal_height", Last(z_goal), "m", "goal line: height of the ball")
     m.summary("goal_sigma", Last(s_goal), "m", "goal line: standard deviation of the height")
     return m
+
+
+def _check_times(camera: object, photos: dict, truth: object, flight: dict) -> None:
+    """Photos come at even steps: a missing one is a row without pixels, not a missing row."""
+    for path, table in ((camera, photos), (truth, flight)):
+        for row, (number, time) in enumerate(zip(table["photo"], table["t"], strict=True)):
+            if number != row or abs(time - row * STEP) > 1e-9:
+                raise DataError(
+                    f"{path}: row {row} is photo {number:g} at {time:g} s; it must be photo {row} "
+                    f"at {row * STEP:g} s; leave i and j empty where there is no photo"
+                )
 
 
 football = build_model()
