@@ -67,7 +67,7 @@ class Comparison:
             if not is_formula(content):
                 found = "is empty" if content is None else f"holds {content!r}"
                 self.problems[address] = f"{found} where a formula belongs"
-            if not self._agree(piece.stored, self.value(address), piece.scale):
+            if not self._agree(address, piece.stored, piece.scale):
                 self.differing[address] = piece
         elif piece.kind in ("formula", "index") and piece.content is None and content is not None:
             self.problems[address] = f"holds {content!r}; there is no value in this row"
@@ -79,9 +79,12 @@ class Comparison:
         sheet, row, column = address
         return self.values.get(sheet, {}).get((row, column))
 
-    def _agree(self, expected: Any, found: Any, scale: float, keep: bool = True) -> bool:
+    def _agree(self, address: Address, expected: Any, scale: float, keep: bool = True) -> bool:
+        found = self.value(address)
         if isinstance(expected, str) or expected is None:
-            return (_no_number(expected) and _no_number(found)) or expected == found
+            # A column without a value is an empty text; a mean of nothing is an error.
+            broken = _error(found) and not expected and address[0] in self.layout.columns
+            return (not broken and _no_number(expected) and _no_number(found)) or expected == found
         if not isinstance(found, int | float) or isinstance(found, bool):
             return False
         size = max(abs(expected), 0 if math.isnan(scale) else scale) or 1.0
@@ -116,10 +119,14 @@ class Comparison:
         try:
             local = eval(python_code(rule), {**self._namespace, "t": row})  # our own source
         except (ArithmeticError, ValueError):
+            local = math.inf
+        if isinstance(local, complex) or math.isinf(local):
+            if _error(self.value(address)):
+                return  # beyond what either can compute
             local = math.nan
         expected = "" if isinstance(local, float) and math.isnan(local) else local
         scale = max([piece.scale, *(abs(_number(self.value(cell))) for cell in inputs)], key=_size)
-        if not self._agree(expected, self.value(address), scale, keep=False):
+        if not self._agree(address, expected, scale, keep=False):
             self.problems[address] = self._words(expected, address)
 
     def _step(self, sheet: str) -> int | None:

@@ -9,7 +9,7 @@ import sys
 import traceback
 from pathlib import Path
 
-from kfsheet.errors import ModelError
+from kfsheet.errors import KfsheetError, ModelError
 from kfsheet.exercise import Exercise
 
 
@@ -41,15 +41,19 @@ def load_exercise(spec: str) -> Exercise:
 
 def _run_file(path: Path) -> object:
     name = f"kfsheet_exercise_{path.stem}"
-    specification = importlib.util.spec_from_file_location(name, path)
+    specification = importlib.util.spec_from_file_location(name, path.resolve())
     module = importlib.util.module_from_spec(specification)
     sys.modules[name] = module
     try:
         specification.loader.exec_module(module)
     except (Exception, SystemExit) as error:  # whatever a user's file raises is told in one line
-        lines = [f for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path)]
+        lines = [
+            f
+            for f in traceback.extract_tb(error.__traceback__)
+            if f.filename == str(path.resolve())
+        ]
         number = getattr(error, "lineno", None) or (lines[-1].lineno if lines else "?")
-        kind = "" if isinstance(error, ModelError) else f"{type(error).__name__}: "
+        kind = "" if isinstance(error, KfsheetError) else f"{type(error).__name__}: "
         raise ModelError(f"{path}, line {number}: {kind}{error}") from None
     return module
 
