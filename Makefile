@@ -13,7 +13,9 @@ all: workbooks notebooks
 	@echo "and the notebooks with: $(BIN)/jupyter lab notebooks"
 
 $(READY): environment.txt pyproject.toml
-	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "kfsheet needs Python 3.11 or newer")'
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and \
+	    "kfsheet needs Python 3.11 or newer; name one: make PYTHON=python3.12")'
+	@echo "Setting up .venv; this takes a minute or two, once."
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r environment.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .

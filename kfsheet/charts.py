@@ -23,7 +23,7 @@ class Look:
 
 # By role, so that truth looks like truth on every chart; colours that the colour-blind tell apart.
 LOOKS = {
-    "truth": Look("222222", width=2.25),
+    "truth": Look("222222", width=1.5),
     "observation": Look("E69F00", line="", marker="circle"),
     "forecast": Look("009E73", line="", marker="diamond"),
     "analysis": Look("0072B2", marker="circle"),
@@ -58,6 +58,8 @@ class Chart:
 
     def check(self, model: Recurrence) -> None:
         """Refuse a chart of columns or roles that do not exist."""
+        if not isinstance(self.series, tuple) or not self.series:
+            raise ModelError(f"chart {self.title!r}: series must be a tuple of at least one Series")
         for series in self.series:
             model.column(series.x), model.column(series.y)
             if series.role not in LOOKS:

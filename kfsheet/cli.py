@@ -9,13 +9,14 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from kfsheet.errors import KfsheetError, ModelError
+from kfsheet import __version__
+from kfsheet.errors import KfsheetError, ModelError, WorkbookError
 
 if TYPE_CHECKING:
     from kfsheet.excel.check import Report
 
 HOLDS, DOES_NOT_HOLD, WRONG_USE = 0, 1, 2
-MOST_PROBLEMS = 20
+MOST_LINES = 20
 ENGINE_NAMES = {"ironcalc": "IronCalc", "libreoffice": "LibreOffice"}
 
 
@@ -33,6 +34,7 @@ def parser() -> Parser:
         prog="kfsheet",
         description="Kalman filters derived once, and written as workbooks of live formulas.",
     )
+    top.add_argument("--version", action="version", version=f"kfsheet {__version__}")
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     exercise = "name of an exercise, or the path of a Python file that defines one"
 
@@ -43,13 +45,21 @@ def parser() -> Parser:
     build.add_argument(
         "--out", default="workbooks", metavar="DIR", help="folder (default: workbooks)"
     )
+    build.add_argument(
+        "--force", action="store_true", help="also replace a workbook that was changed"
+    )
     build.set_defaults(run=run_build)
 
     check = commands.add_parser(
         "check", help="recalculate workbooks from nothing and compare them with NumPy"
     )
-    check.add_argument("workbooks", nargs="+", metavar="WORKBOOK")
-    check.add_argument("--engine", choices=list(ENGINE_NAMES), default="ironcalc")
+    check.add_argument("workbooks", nargs="+", metavar="WORKBOOK", help="an .xlsx file")
+    check.add_argument(
+        "--engine",
+        choices=list(ENGINE_NAMES),
+        default="ironcalc",
+        help="who recalculates (default: ironcalc, which is built in)",
+    )
     check.add_argument(
         "--exercise",
         metavar="FILE.py",
@@ -60,7 +70,11 @@ def parser() -> Parser:
     show = commands.add_parser("show", help="print a model in another dress")
     show.add_argument("exercise", metavar="EXERCISE", help=exercise)
     show.add_argument(
-        "--as", dest="dress", choices=["python", "latex", "excel", "table"], default="table"
+        "--as",
+        dest="dress",
+        choices=["python", "latex", "excel", "table"],
+        default="table",
+        help="Python source, LaTeX, Excel formulas, or a table of numbers (default)",
     )
     show.set_defaults(run=run_show)
     return top
@@ -71,10 +85,13 @@ def run_build(arguments: argparse.Namespace) -> int:
     from kfsheet.excel.workbook import write_workbook
     from kfsheet.exercises import exercise_names, load_exercise
 
-    exercises = [load_exercise(spec) for spec in arguments.exercises or exercise_names()]
+    specs = dict.fromkeys(arguments.exercises or exercise_names())
+    exercises = [load_exercise(spec) for spec in specs]
+    if Path(arguments.out).suffix == ".xlsx":
+        raise WorkbookError(f"--out {arguments.out} is a file name; give a folder")
     written = []
     for exercise in progress(exercises, "build", [e.name for e in exercises]):
-        written.append(write_workbook(exercise, Path(arguments.out)))
+        written.append(write_workbook(exercise, Path(arguments.out), force=arguments.force))
     for path in written:
         print(path)
     return HOLDS
@@ -111,10 +128,11 @@ def _check_one(path: Path, arguments: argparse.Namespace) -> int:
     report = check_workbook(path, exercise, arguments.engine)
     for change in report.changed:
         print(f"{path}: changed: {change}")
-    for problem in report.problems[:MOST_PROBLEMS]:
-        print(f"{path}: {problem}")
-    if len(report.problems) > MOST_PROBLEMS:
-        print(f"{path}: ... and {len(report.problems) - MOST_PROBLEMS} more")
+    lines = report.lines()
+    for line in lines[:MOST_LINES]:
+        print(f"{path}: {line}")
+    if len(lines) > MOST_LINES:
+        print(f"{path}: ... and {len(lines) - MOST_LINES} more lines like these")
     print(f"{path}: {_verdict(report)}")
     return HOLDS if report.holds else DOES_NOT_HOLD
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 
 from kfsheet.charts import Chart
 from kfsheet.errors import ModelError
-from kfsheet.parts import Column
 from kfsheet.recurrence import Recurrence
 
 
@@ -53,6 +52,13 @@ class Exercise:
     sections: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        for name, kind in (("about", str), ("charts", Chart), ("questions", Question)):
+            given = getattr(self, name)
+            if not isinstance(given, tuple) or not all(isinstance(item, kind) for item in given):
+                raise ModelError(
+                    f"{self.name}: {name} is {given!r:.60}; give a tuple of {kind.__name__}, "
+                    "with a comma even after a single one"
+                )
         self.model.validate()
         for chart in self.charts:
             chart.check(self.model)
@@ -62,13 +68,14 @@ class Exercise:
             raise ModelError(f"{self.name} has no section {unknown.pop()!r}")
 
     def _check_question(self, question: Question) -> None:
+        if not isinstance(question.points, int) or question.points <= 0:
+            raise ModelError(
+                f"question {question.name} has {question.points!r} points; give 1, 2, 3, ..."
+            )
         if question.name in self.model.derived_scalars:
             return
-        column: Column = self.model.column(question.name)
-        if column.is_data:
+        if self.model.column(question.name).is_data:
             raise ModelError(f"question {question.name}: the column is data, not a formula")
-        if question.points <= 0:
-            raise ModelError(f"question {question.name} has {question.points} points")
 
     @property
     def name(self) -> str:

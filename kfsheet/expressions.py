@@ -37,6 +37,13 @@ class _Missing(Expr, metaclass=Singleton):
 Missing = _Missing()
 
 
+class ColumnBase(IndexedBase):
+    """A column as a whole; ``x[t]`` is its cell in row t."""
+
+    # Python would otherwise iterate over x[0], x[1], ... for ever, as in the builtin sum(x).
+    __iter__ = None
+
+
 def when_observed(
     cells: Indexed | tuple[Indexed, ...], value: Expr, otherwise: Expr = Missing
 ) -> Piecewise:

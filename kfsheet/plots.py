@@ -23,7 +23,7 @@ def draw(chart: Chart, frame: pd.DataFrame, ax: Axes | None = None) -> Axes:
     chart : Chart
         The specification.
     frame : pandas.DataFrame
-        What :func:`kfsheet.evaluation` returned.
+        What :func:`kfsheet.evaluate` returned.
     ax : matplotlib axes, optional
         Where to draw; a new figure by default.
 
@@ -51,7 +51,8 @@ def draw(chart: Chart, frame: pd.DataFrame, ax: Axes | None = None) -> Axes:
             label=series.label or "_",
         )
     if chart.origin_top_left:
-        ax.invert_yaxis()
+        ax.set_ylim(ax.get_ylim()[1], 0)
+        ax.set_xlim(left=0)
     ax.set(title=chart.title, xlabel=chart.x_label, ylabel=chart.y_label)
     ax.grid(alpha=0.3)
     # Below, as in the workbook: inside, it would hide what the chart is about.

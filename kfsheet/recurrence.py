@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from sympy import Basic, Expr, Indexed, IndexedBase, Symbol
 
 from kfsheet import checks
 from kfsheet.errors import DataError, ModelError
-from kfsheet.expressions import Aggregate, Last, Missing, column_references, t
+from kfsheet.expressions import Aggregate, ColumnBase, Last, Missing, column_references, t
 from kfsheet.names import excel_name_problem, name_problem, section_problem
 from kfsheet.parts import Column, Parameter, Scalar, checked_values
 from kfsheet.schedule import Pass, schedule
@@ -164,7 +165,7 @@ class Recurrence:
         for name in names:
             if problem := name_problem(name) or self._taken(name):
                 raise ModelError(f"column {name!r}: {problem}")
-            self.table[name] = Column(IndexedBase(name, real=True), section)
+            self.table[name] = Column(ColumnBase(name, real=True), section)
         return tuple(self.table[name].base for name in names)
 
     def define(
@@ -191,6 +192,8 @@ class Recurrence:
         column = self._definable(cell)
         checks.check_words(column.name, description)
         parse_unit(unit)
+        if not isinstance(start, Sequence) or isinstance(start, str):
+            raise ModelError(f"{column.name}: start is {start!r}; give a list, as in start=[0]")
         rules = tuple(self._checked(column.name, rule) for rule in (*start, expression))
         for row, rule in enumerate(rules):
             checks.check_lags(column.name, rule, row, len(start))
@@ -214,10 +217,19 @@ class Recurrence:
         if checks.columns_read(expression):
             raise ModelError("the clock reads a column; give it as a formula of t and parameters")
         parse_unit(unit)
-        self.clock = Column(IndexedBase("time", real=True), "", unit, description, expression)
+        self.clock = Column(ColumnBase("time", real=True), "", unit, description, expression)
         return self.clock.base
 
     # -- asking it -------------------------------------------------------------------------
+
+    def __getitem__(self, names: str | tuple[str, ...]) -> Any:
+        """Symbol of a scalar or base of a column: ``m["dt"]``; of several: ``m["dt", "x_a"]``."""
+        if isinstance(names, tuple):
+            return tuple(self[name] for name in names)
+        scalar = self._scalars().get(names)
+        return scalar.symbol if scalar else self.column(names).base
+
+    __iter__ = None  # a recurrence has no order of its own: see table, sections, parameters
 
     @property
     def rows(self) -> int:
@@ -296,6 +308,12 @@ class Recurrence:
         list of UnitProblem
             Empty if all expressions are sound.
         """
+        for what, given, names in (
+            ("unit", units, self.units()),
+            ("value", values, self.defaults()),
+        ):
+            if unknown := sorted(set(given or {}) - set(names)):
+                raise ModelError(f"a {what} is given for {unknown[0]}, which {self.name} lacks")
         known = {**self.units(), **(units or {})}
         numbers = {**self.defaults(), **(values or {})}
         for scalar in self.derived_scalars.values():

@@ -88,7 +88,7 @@ def _texts(layout: Layout, section: str, column: Column, rows: Iterable[int]) ->
 
 
 def formula_table(model: Recurrence, section: str, rows: int = 3) -> pd.DataFrame:
-    """Formulas of the first rows of a worksheet: one line per column, one column per row.
+    """Formulas of the first rows of a worksheet: a line for each column, led by its letter.
 
     Raises
     ------
@@ -101,10 +101,13 @@ def formula_table(model: Recurrence, section: str, rows: int = 3) -> pd.DataFram
         raise ModelError(f"no section {section!r}; there is {', '.join(model.sections)}")
     layout = Layout.standard(model)
     table = {
-        column.name: list(_texts(layout, section, column, range(rows)))
-        for column in model.sections[section]
+        column.name: [
+            get_column_letter(layout.columns[section][column.name]),
+            *_texts(layout, section, column, range(rows)),
+        ]
+        for column in (*([model.clock] if model.clock else []), *model.sections[section])
     }
-    headers = [f"row {FIRST_ROW + row}" for row in range(rows)]
+    headers = ["column", *(f"row {FIRST_ROW + row}" for row in range(rows))]
     return pd.DataFrame.from_dict(table, orient="index", columns=headers)
 
 

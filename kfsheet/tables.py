@@ -11,6 +11,9 @@ from pathlib import Path
 from kfsheet.errors import DataError
 from kfsheet.parts import as_number
 
+Table = dict[str, list[float]]
+"""Columns of numbers by name."""
+
 
 def read_table(
     path: str | Path,
@@ -18,7 +21,7 @@ def read_table(
     *,
     times: str,
     may_be_missing: Collection[str] = (),
-) -> dict[str, list[float]]:
+) -> Table:
     """Read a CSV file that has exactly ``columns``, as lists of floats by name.
 
     Parameters
@@ -47,7 +50,7 @@ def read_table(
     _check_header(path, header, columns)
     if not rows:
         raise DataError(f"{path} has a header but no rows")
-    table: dict[str, list[float]] = {name: [] for name in header}
+    table: Table = {name: [] for name in header}
     for line, row in enumerate(rows, start=2):
         if len(row) != len(header):
             raise DataError(f"{path}, line {line} has {len(row)} fields, the header {len(header)}")

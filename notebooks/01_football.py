@@ -11,10 +11,14 @@
 # %%
 import matplotlib.pyplot as plt
 import pandas as pd
-from sympy import Eq, Function, Matrix, diag, simplify, solve, symbols
+from IPython.display import display
+from sympy import Eq, Function, Matrix, diag, init_printing, simplify, solve, symbols
 
 import kfsheet as kf
 from kfsheet.exercises.football import exercise, football
+
+init_printing(use_latex="mathjax", latex_printer=lambda e, **_: kf.latex_code(e))
+CHARTS = {chart.title: chart for chart in exercise.charts}
 
 # %% [markdown]
 # ## The gain, derived
@@ -24,11 +28,17 @@ from kfsheet.exercises.football import exercise, football
 # $$x_a = x_f + B H' \, (R + H B H')^{-1} \, (y - H[x_f])$$
 #
 # For two quantities, each observed by itself, all three matrices are diagonal. We let SymPy do the
-# algebra and look at every step. First $H B H'$: the error of the forecast as the camera sees it.
+# algebra and look at every step. These are $B$, $R$ and $H$:
 
 # %%
 A = kf.diagonal_analysis(2)
-A.HBHt
+display(A.B, A.R, A.H)
+
+# %% [markdown]
+# First $B H'$ and $H B H'$: the error of the forecast, half and then fully as the camera sees it.
+
+# %%
+display(A.BHt, A.HBHt)
 
 # %% [markdown]
 # Add the camera's own error and we have $S$, the variance of the innovation. It is what the
@@ -38,11 +48,23 @@ A.HBHt
 A.S
 
 # %% [markdown]
-# The inverse of a diagonal matrix is the diagonal of inverses, so $K = B H' S^{-1}$ needs no matrix
-# at all: one scalar gain for each quantity. This is the formula that will stand in a cell.
+# The inverse of a diagonal matrix is the diagonal of inverses:
+
+# %%
+A.S_inverse
+
+# %% [markdown]
+# So $K = B H' S^{-1}$ needs no matrix at all: one scalar gain for each quantity. This is the
+# formula that will stand in a cell.
 
 # %%
 A.K
+
+# %% [markdown]
+# And the analysis itself, one line for each quantity:
+
+# %%
+A.x_a
 
 # %% [markdown]
 # ### The camera's operator is affine
@@ -106,15 +128,27 @@ football.table["x_f"].expression
 
 # %%
 with pd.option_context("display.max_colwidth", None):
-    display(kf.formula_table(football, "Reanalysis"))  # noqa: F821 - Jupyter's
+    display(kf.formula_table(football, "Reanalysis"))
 
 # %% [markdown]
-# Does the sheet compute what NumPy computes? An independent spreadsheet engine recalculates the
-# workbook from nothing: as it stands, with every input moved by one percent, and with photos
+# Does the sheet compute what NumPy computes? IronCalc, an independent spreadsheet engine,
+# recalculates the workbook from nothing. Here are its analyses of $x$ beside NumPy's.
+
+# %%
+WORKBOOK = "../workbooks/football.xlsx"
+K = 11  # the column of x_a
+sheet = kf.recalculate(WORKBOOK)["Reanalysis"]
+both = pd.DataFrame({"sheet": [sheet[row, K] for row in range(4, 20)]})
+both["NumPy"] = kf.evaluate(football)["x_a"]
+assert (both["sheet"] - both["NumPy"]).abs().max() < 1e-12
+both.iloc[::5].round(6)
+
+# %% [markdown]
+# And now every formula: as it stands, with every input moved by one percent, and with photos
 # taken out.
 
 # %%
-report = kf.check_workbook("../workbooks/football.xlsx", exercise)
+report = kf.check_workbook(WORKBOOK, exercise)
 assert report.holds
 assert report.largest < 1e-12
 print(f"{report.cells} formulas agree with NumPy to 12 figures: {report.holds}")
@@ -127,7 +161,7 @@ print(f"{report.cells} formulas agree with NumPy to 12 figures: {report.holds}")
 
 # %%
 printed = kf.evaluate(football)
-_ = kf.draw(exercise.charts[0], printed)
+_ = kf.draw(CHARTS["The kick, in metres"], printed)
 
 # %% [markdown]
 # The free run is hopeless, so the photos do help, and the analysis lies on the path. But a dot on
@@ -155,8 +189,8 @@ errors(printed).round(3)
 
 # %%
 fig, axes = plt.subplots(1, 2, figsize=(11, 3.6), layout="constrained")
-for chart, ax in zip(exercise.charts[2:4], axes, strict=True):
-    kf.draw(chart, printed, ax)
+for pixel, ax in zip("ij", axes, strict=True):
+    kf.draw(CHARTS[f"Innovations in {pixel}"], printed, ax)
 
 # %% [markdown]
 # All innovations in $i$ are negative, and 14 of 15 lie outside the band. (In this filter neighbours
@@ -249,12 +283,12 @@ pd.DataFrame({k: {s: r.attrs["scalars"][s] for s in hidden} for k, r in RUNS.ite
 # here, 4.1 pixels instead of 3: sixteen photos can be unlucky. See exercise 6.
 
 # %%
-_ = kf.draw(exercise.charts[0], consistent)
+_ = kf.draw(CHARTS["The kick, in metres"], consistent)
 # %% [markdown]
 # ### And as the camera sees it
 
 # %%
-_ = kf.draw(exercise.charts[1], consistent)
+_ = kf.draw(CHARTS["The kick, as the camera sees it"], consistent)
 # %% [markdown]
 # ## What if
 #
@@ -273,7 +307,7 @@ from ipywidgets import FloatSlider, interact
 )
 def what_if(camera, model, h, p):
     variances = {"r_i": camera**2, "r_j": camera**2, "b_x": model**2, "b_z": model**2}
-    kf.draw(exercise.charts[0], kf.evaluate(football, h=h, p=p, **variances))
+    kf.draw(CHARTS["The kick, in metres"], kf.evaluate(football, h=h, p=p, **variances))
 
 
 # %% [markdown]
@@ -283,7 +317,7 @@ def what_if(camera, model, h, p):
 # %%
 fig, axes = plt.subplots(1, 2, figsize=(11, 3.8), sharey=True, layout="constrained")
 for pixels, ax in zip((3, 30), axes, strict=True):
-    kf.draw(exercise.charts[0], kf.evaluate(football, r_i=pixels**2, r_j=pixels**2), ax)
+    kf.draw(CHARTS["The kick, in metres"], kf.evaluate(football, r_i=pixels**2, r_j=pixels**2), ax)
     ax.set_title(f"camera error {pixels} px")
 
 # %%
@@ -305,8 +339,8 @@ gap.loc[6:8, ["i", "d_i", "x_f", "x_a", "z_f", "z_a"]].round(3)
 # ### When does it cross the line?
 #
 # At every photo the filter can say how high the ball will be at $x = 0$. The forecast should
-# settle. Its standard deviation counts the errors of the last two analyses only, not the drag that lies
-# ahead: early forecasts are off by much more than it says.
+# settle. Its standard deviation counts the errors of the last two analyses only, not the drag that
+# lies ahead: early forecasts are off by much more than it says.
 
 # %%
 consistent[["wait", "z_goal", "s_goal"]].iloc[::3].round(2)

@@ -46,6 +46,18 @@ def test_changed_parameters_and_photos_are_told_and_still_hold(engine, damaged):
     assert report.changed == ["r_i 9 -> 900", "h 0.5 -> 0", "1 value of i"]
 
 
+def test_answers_still_to_be_filled_in_are_named_in_order_and_nothing_else(engine, damaged):
+    """A half-filled coursework: what follows from an empty cell is not called wrong."""
+    emptied = {f"Reanalysis!{c}{r}": None for c in "GK" for r in range(4, 20)}
+    report = check_workbook(damaged({"Parameters!B24": None, **emptied}), exercise, engine)
+    assert report.lines() == [
+        "Parameters!B24: is empty where a formula belongs",
+        "Reanalysis!G4 to Reanalysis!G19: each is empty where a formula belongs",
+        "Reanalysis!K4 to Reanalysis!K19: each is empty where a formula belongs",
+    ]
+    assert report.followers > 100
+
+
 @pytest.mark.parametrize("rows", [[4], [19], range(4, 20)], ids=["first", "last", "all"])
 def test_photos_may_be_missing_anywhere(engine, damaged, rows):
     path = damaged({f"Reanalysis!{column}{row}": None for column in "CD" for row in rows})
@@ -118,7 +130,7 @@ def _mutant(formula):
 
 def test_two_damaged_cells_are_both_reported(damaged):
     path = damaged({"Reanalysis!G9": "=K8", "Free run!F12": "=0"})
-    assert places(check_workbook(path, exercise)) == ["'Free run'!F12", "Reanalysis!G9"]
+    assert places(check_workbook(path, exercise)) == ["Reanalysis!G9", "'Free run'!F12"]
 
 
 def test_stored_values_are_never_believed(engine, football_file, tmp_path):

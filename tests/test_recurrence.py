@@ -7,16 +7,20 @@ from sympy import Float, Or, Piecewise, Rational, Symbol, exp, gamma, pi, sign, 
 
 from kfsheet import (
     RMS,
+    Chart,
     DataError,
+    Exercise,
     Mean,
     ModelError,
     Observed,
+    Question,
     Recurrence,
     SumProduct,
     evaluate,
     t,
     when_observed,
 )
+from kfsheet.exercises.football import football
 from kfsheet.expressions import Missing
 
 
@@ -282,3 +286,45 @@ def test_missing_is_one_object_and_prints_its_name():
     assert str(Missing) == "Missing"
     assert Missing == type(Missing)()
     assert RMS(Recurrence("a_b", title="x").columns("v", section="S")[0]).args
+
+
+def test_a_column_is_not_a_list_of_cells(m):
+    """The builtin sum would otherwise never end."""
+    with pytest.raises(TypeError, match="not iterable"):
+        sum(m["v"])
+    with pytest.raises(TypeError, match="not iterable"):
+        list(m)
+
+
+def test_what_is_defined_can_be_had_by_name(m):
+    assert m["v"] is m.table["v"].base
+    assert m["dt", "v"] == (m.parameters["dt"].symbol, m.table["v"].base)
+    with pytest.raises(ModelError, match="no column 'q'"):
+        m["q"]
+
+
+def test_a_unit_of_something_that_does_not_exist_is_refused(m):
+    with pytest.raises(ModelError, match="a unit is given for dq, which"):
+        m.check_units(units={"dq": "s"})
+    with pytest.raises(ModelError, match="a value is given for dq"):
+        m.check_units(values={"dq": 1})
+
+
+def test_start_values_come_in_a_list(m):
+    (w,) = m.columns("w_1", section="Fall")
+    with pytest.raises(ModelError, match="give a list, as in start="):
+        m.define(w[t], w[t - 1], "m", "what falls", start=0)
+
+
+@pytest.mark.parametrize(
+    ("bundle", "message"),
+    [
+        ({"about": "text"}, "give a tuple of str"),
+        ({"charts": [1]}, "give a tuple of Chart"),
+        ({"questions": (Question("x_f", 0, "?"),)}, "has 0 points"),
+        ({"charts": (Chart("c", "x", "y", ()),)}, "at least one Series"),
+    ],
+)
+def test_an_exercise_refuses_what_its_workbook_could_not_hold(bundle, message):
+    with pytest.raises(ModelError, match=message):
+        Exercise(**{"model": football, "about": ("a",), "source": "s", **bundle})

@@ -11,7 +11,7 @@ from openpyxl.utils import FORMULAE
 
 from kfsheet import WorkbookError, evaluate, write_workbook
 from kfsheet.excel.layout import FIRST_ROW
-from kfsheet.excel.recalculate import recalculate
+from kfsheet.excel.recalculate import convert, recalculate
 from kfsheet.excel.workbook import is_formula, workbook_bytes
 from kfsheet.exercises.football import exercise, football
 
@@ -34,6 +34,22 @@ def formulas(book):
             for cell in row:
                 if is_formula(cell.value):
                     yield sheet.title, cell
+
+
+def test_a_workbook_that_somebody_changed_is_not_overwritten(tmp_path, engine):
+    """Whichever program saved it: openpyxl, or LibreOffice."""
+    path = write_workbook(exercise, tmp_path)
+    assert write_workbook(exercise, tmp_path) == path
+    if engine == "libreoffice":
+        convert(path, tmp_path / "saved", "xlsx:Calc MS Excel 2007 XML").replace(path)
+    else:
+        openpyxl.load_workbook(path).save(path)
+    changed = path.read_bytes()
+    with pytest.raises(WorkbookError, match="move it away to keep it"):
+        write_workbook(exercise, tmp_path)
+    assert path.read_bytes() == changed
+    write_workbook(exercise, tmp_path, force=True)
+    assert path.read_bytes() != changed
 
 
 def test_sheets_stand_in_the_order_of_the_contract(book):
@@ -166,7 +182,6 @@ def test_the_legend_of_colours_and_the_way_to_use_it_stand_on_read_me(book):
         "a parameter",
         "a measurement",
         "a formula",
-        "an answer",
         "change r_i",
         "football",
     ):

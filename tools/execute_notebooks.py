@@ -14,7 +14,7 @@ import nbformat
 from nbclient import NotebookClient
 
 from kfsheet.cli import progress
-from kfsheet.excel.finish import write_file
+from kfsheet.files import write_file
 
 FOLDER = Path(__file__).parents[1] / "notebooks"
 KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}

@@ -43,6 +43,11 @@ class Problem:
     def __str__(self) -> str:
         return f"{place(self.address)}: {self.reason}"
 
+    def follows(self, other: Problem) -> bool:
+        """Whether this is the cell below, with the same reason."""
+        sheet, row, column = other.address
+        return self.address == (sheet, row + 1, column) and self.reason == other.reason
+
 
 @dataclass
 class Report:
@@ -57,6 +62,21 @@ class Report:
     problems: list[Problem]
     followers: int
     """How many more cells differ only because they follow from one that is wrong."""
+
+    def lines(self) -> list[str]:
+        """The problems in words, neighbours in a column with the same reason as one line."""
+        groups: list[list[Problem]] = []
+        for problem in self.problems:
+            if groups and problem.follows(groups[-1][-1]):
+                groups[-1].append(problem)
+            else:
+                groups.append([problem])
+        return [
+            str(g[0])
+            if len(g) == 1
+            else f"{place(g[0].address)} to {place(g[-1].address)}: each {g[0].reason}"
+            for g in groups
+        ]
 
     @property
     def holds(self) -> bool:
@@ -114,9 +134,19 @@ def check_workbook(path: str | Path, exercise: Exercise, engine: str = "ironcalc
         first.cells,
         first.largest,
         list(_changed(inputs, built)),
-        [Problem(address, found[address]) for address in sorted(found)],
+        _in_order(found, book.sheetnames),
         len(differing - set(found)),
     )
+
+
+def _in_order(found: dict[Address, str], sheets: list[str]) -> list[Problem]:
+    """Problems as the book shows them: sheet by sheet, and there column by column."""
+
+    def key(address: Address) -> tuple[int, int, int]:
+        sheet, row, column = address
+        return sheets.index(sheet), column, row
+
+    return [Problem(address, found[address]) for address in sorted(found, key=key)]
 
 
 def _changed(inputs: Inputs, built: Run) -> Iterator[str]:

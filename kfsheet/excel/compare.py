@@ -126,8 +126,11 @@ class Comparison:
             local = math.nan
         expected = "" if isinstance(local, float) and math.isnan(local) else local
         scale = max([piece.scale, *(abs(_number(self.value(cell))) for cell in inputs)], key=_size)
-        if not self._agree(address, expected, scale, keep=False):
-            self.problems[address] = self._words(expected, address)
+        if self._agree(address, expected, scale, keep=False):
+            return
+        if any(cell in self.problems and _no_number(self.value(cell)) for cell in inputs):
+            return  # an answer is still to be filled in; a sheet reads 0 where NumPy has no value
+        self.problems[address] = self._words(expected, address)
 
     def _step(self, sheet: str) -> int | None:
         return self.layout.columns.get(sheet, {}).get("t")

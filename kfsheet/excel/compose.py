@@ -117,7 +117,9 @@ def _formula_column(page: Page, layout: Layout, column: Column, at: int, now: Ru
     _head(page, at, column.name, column.unit, column.description)
     values = now.columns[column.name]
     shape, size = number_format(values), rms(values)
-    kind = "index" if column is layout.model.clock else "formula"
+    kind = "formula"
+    if column is layout.model.clock:
+        kind, shape = "index", "0.0##"
     rules = [(rule, layout.formula(rule, page.title)) for rule in column.rules]
     for row, value in enumerate(values):
         rule, text = rules[min(row, len(column.start))]

@@ -6,22 +6,22 @@ or a phone needs the values; a build that is to be compared byte by byte must no
 
 from __future__ import annotations
 
-import os
 import re
-import tempfile
 import zipfile
+import zlib
 from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
 from xml.sax.saxutils import escape
-
-from kfsheet.errors import WorkbookError
 
 EPOCH = (1980, 1, 1, 0, 0, 0)
 FORMULA = re.compile(r'<c r="([A-Z]+\d+)"([^>]*)><f>(.*?)</f><v ?/?>(?:</v>)?</c>', re.DOTALL)
 # An empty cell that is typed as a number is read as 0 by some programs.
 EMPTY = re.compile(r'(<c r="[A-Z]+\d+"(?: s="\d+")?) t="n"( ?/>)')
 MOMENT = re.compile(r"(<dcterms:(created|modified)[^>]*>)[^<]*(</dcterms:\2>)")
+# Every program that saves a workbook writes its own name here.
+PROGRAM = re.compile(rb"(<Application>)[^<]*(</Application>)")
+BY_US = b"kfsheet"
 
 Value = float | int | str | bool | None
 
@@ -39,6 +39,8 @@ def finish(saved: bytes, values: Mapping[str, Mapping[str, Value]]) -> bytes:
                 content = _with_values(content.decode(), values[name]).encode()
             elif name == "docProps/core.xml":
                 content = MOMENT.sub(r"\g<1>2000-01-01T00:00:00Z\3", content.decode()).encode()
+            elif name == "docProps/app.xml":
+                content = PROGRAM.sub(rb"\g<1>%s\2" % BY_US, content)
             info = zipfile.ZipInfo(name, EPOCH)
             info.compress_type, info.create_system = zipfile.ZIP_DEFLATED, 0
             new.writestr(info, content)
@@ -63,39 +65,11 @@ def _typed(value: Value) -> tuple[str, str]:
     return "", repr(value)
 
 
-def write_file(path: str | Path, content: bytes) -> Path:
-    """Write a file whole or not at all: to a temporary neighbour, then renamed.
-
-    Raises
-    ------
-    WorkbookError
-        If the folder cannot be made or written, naming it.
-    """
-    path = Path(path)
+def untouched(path: Path) -> bool:
+    """Whether a workbook is as it was built: no other program has saved it since."""
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    except OSError as error:
-        raise _unwritable(path, error) from None
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        os.chmod(temporary, 0o666 & ~_umask())
-        os.replace(temporary, path)
-    except OSError as error:
-        Path(temporary).unlink(missing_ok=True)
-        raise _unwritable(path, error) from None
-    return path
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
-
-
-def _unwritable(path: Path, error: OSError) -> WorkbookError:
-    return WorkbookError(
-        f"{path} cannot be written ({error.strerror}); choose another folder, "
-        "or close the file if a program holds it open"
-    )
+        with zipfile.ZipFile(path) as archive:
+            program = PROGRAM.search(archive.read("docProps/app.xml"))
+    except (OSError, KeyError, zipfile.BadZipFile, zlib.error):
+        return False
+    return bool(program) and program[0].split(b">")[1].startswith(BY_US)

@@ -29,6 +29,11 @@ Values = dict[str, dict[tuple[int, int], CellValue]]
 """Value by sheet and (row, column), counted from 1; errors are strings such as '#DIV/0!'."""
 
 TIMEOUT = 300  # seconds, for LibreOffice
+# Where installers put it on macOS and Windows without a word to PATH.
+LIBREOFFICE_HOMES = (
+    "/Applications/LibreOffice.app/Contents/MacOS/soffice",
+    r"C:\Program Files\LibreOffice\program\soffice.exe",
+)
 CELL = re.compile(rb"<((?:\w+:)?c)((?:\s[^>]*[^>/])?)>(.*?)</\1>", re.DOTALL)
 VALUE = re.compile(rb"<((?:\w+:)?v)\b[^>]*?(?:/>|>.*?</\1>)", re.DOTALL)
 TYPE = re.compile(rb'\s+t="[^"]*"')
@@ -185,13 +190,11 @@ def _ironcalc(copy: Path) -> Values:
 
 def libreoffice() -> str | None:
     """Path of LibreOffice's command, if it is installed."""
-    return shutil.which("soffice") or shutil.which("libreoffice")
+    on_path = shutil.which("soffice") or shutil.which("libreoffice")
+    return on_path or next((place for place in LIBREOFFICE_HOMES if Path(place).exists()), None)
 
 
 def _libreoffice(copy: Path) -> Values:
-    command = libreoffice()
-    if command is None:
-        raise EngineError("LibreOffice is not installed; install it, or use --engine ironcalc")
     converted = convert(copy, copy.parent / "out", "xlsx:Calc MS Excel 2007 XML")
     book = open_workbook(converted, data_only=True)
     return {
@@ -210,9 +213,12 @@ def convert(path: Path, folder: Path, kind: str) -> Path:
 
     Each call has a profile of its own: two LibreOffices with one profile block each other.
     """
+    command = libreoffice()
+    if command is None:
+        raise EngineError("LibreOffice is not installed; install it, or use --engine ironcalc")
     with tempfile.TemporaryDirectory(prefix="kfsheet-profile-") as profile:
         arguments = [
-            libreoffice(),
+            command,
             f"-env:UserInstallation={Path(profile).as_uri()}",
             "--headless",
             "--convert-to",

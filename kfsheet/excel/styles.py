@@ -27,9 +27,8 @@ KINDS = {
 }
 LEGEND = {
     "parameter": "a parameter: change it and watch what happens",
-    "data": "a measurement or another given number; an empty photo is a missing photo",
+    "data": "a measurement or another given number; an empty observation was not made",
     "formula": "a formula: it follows from the cells before it",
-    "answer": "an answer to be filled in (only in handouts)",
 }
 BOXED = set(KINDS) - {"title", "heading", "text"}
 

@@ -14,6 +14,7 @@ from openpyxl.workbook.defined_name import DefinedName
 from openpyxl.worksheet.datavalidation import DataValidation
 from openpyxl.worksheet.worksheet import Worksheet
 
+from kfsheet.errors import WorkbookError
 from kfsheet.excel.checkpage import FAIL, PASS, check_page
 from kfsheet.excel.compose import (
     Page,
@@ -24,10 +25,11 @@ from kfsheet.excel.compose import (
     section_page,
 )
 from kfsheet.excel.drawing import draw
-from kfsheet.excel.finish import Value, finish, write_file
+from kfsheet.excel.finish import Value, finish, untouched
 from kfsheet.excel.layout import FIRST_ROW, Layout
 from kfsheet.excel.styles import Styles
 from kfsheet.exercise import Exercise
+from kfsheet.files import write_file
 
 TITLE_HEIGHT = 26
 TABS = {"Read me": "1F3864", "Parameters": "FFC000", "Charts": "0072B2", "Check": "70AD47"}
@@ -66,7 +68,7 @@ def workbook_bytes(exercise: Exercise) -> bytes:
     return finish(saved.getvalue(), _stored_values(pages))
 
 
-def write_workbook(exercise: Exercise, path: str | Path) -> Path:
+def write_workbook(exercise: Exercise, path: str | Path, *, force: bool = False) -> Path:
     """Write the workbook of an exercise.
 
     Parameters
@@ -76,6 +78,9 @@ def write_workbook(exercise: Exercise, path: str | Path) -> Path:
     path : path
         File to write, ending in ``.xlsx``, or a folder, which gets ``NAME.xlsx``.
 
+    force : bool
+        Whether to replace a workbook that another program has saved: somebody's changes.
+
     Returns
     -------
     Path
@@ -84,12 +89,17 @@ def write_workbook(exercise: Exercise, path: str | Path) -> Path:
     Raises
     ------
     WorkbookError
-        If the file cannot be written; nothing half-written stays behind.
+        If the file cannot be written, or holds somebody's changes; nothing half-written stays.
     PrintError
         If a formula has no equivalent in Excel 2010.
     """
     path = Path(path)
     target = path if path.suffix == ".xlsx" else path / f"{exercise.name}.xlsx"
+    if target.is_file() and not force and not untouched(target):
+        raise WorkbookError(
+            f"{target} was changed since it was built; move it away to keep it, "
+            "or replace it with: kfsheet build --force"
+        )
     return write_file(target, workbook_bytes(exercise))
 
 
