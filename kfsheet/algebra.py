@@ -13,7 +13,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sympy import Expr, Matrix, Symbol, diag, factor, limit, oo, simplify, sqrt, symbols
+from sympy import (
+    Expr,
+    Matrix,
+    Symbol,
+    diag,
+    eye,
+    factor,
+    integrate,
+    inverse_laplace_transform,
+    limit,
+    oo,
+    simplify,
+    sqrt,
+    symbols,
+    zeros,
+)
 
 from kfsheet.errors import ModelError
 
@@ -197,3 +212,87 @@ def sequential_gain(B: Matrix, h: Matrix, r: Any) -> tuple[Matrix, Matrix]:
     S = (h * B * h.T)[0] + r
     K = B * h.T / S
     return K, B - K * h * B
+
+
+def transition_matrix(F: Matrix, dt: Expr) -> Matrix:
+    """Transition matrix of ``dx/dt = F x`` over a step: the series that ends.
+
+        Phi = I + F dt + F^2 dt^2/2! + ...
+
+    Parameters
+    ----------
+    F : Matrix
+        n x n dynamics matrix, nilpotent: some power of it is 0.
+    dt : Expr
+        The step, s.
+
+    Raises
+    ------
+    ModelError
+        If F is not square, or no power of it is 0 so that the series does not end.
+
+    Examples
+    --------
+    >>> from sympy import Matrix, Symbol
+    >>> transition_matrix(Matrix([[0, 1], [0, 0]]), Symbol("dt"))
+    Matrix([
+    [1, dt],
+    [0,  1]])
+    """
+    _check_square("F", F)
+    term, total = eye(F.rows), zeros(F.rows, F.rows)
+    for k in range(1, F.rows + 1):
+        total += term
+        term = (term * F * dt / k).applyfunc(simplify)
+        if term.is_zero_matrix:
+            return total
+    raise ModelError(f"no power of F is 0, so the series does not end; F is {F}")
+
+
+def transition_matrix_laplace(F: Matrix, dt: Symbol) -> Matrix:
+    """The same by the inverse Laplace transform of (s I - F)^-1, for any square F."""
+    _check_square("F", F)
+    s = Symbol("s")
+    resolvent = (s * eye(F.rows) - F).inv().applyfunc(simplify)
+    step = Symbol("step", positive=True)
+    transform = resolvent.applyfunc(lambda e: inverse_laplace_transform(e, s, step))
+    return transform.subs(step, dt).applyfunc(simplify)
+
+
+def discrete_noise(F: Matrix, Q: Matrix, dt: Expr) -> Matrix:
+    """Covariance that white noise of spectral density Q adds during a step.
+
+        Q_k = integral from 0 to dt of Phi(tau) Q Phi(tau)' dtau
+
+    Parameters
+    ----------
+    F, Q : Matrix
+        n x n dynamics matrix (nilpotent) and spectral density, symmetric.
+    dt : Expr
+        The step, s.
+
+    Raises
+    ------
+    ModelError
+        If a shape does not fit, or the series of the transition matrix does not end.
+
+    Examples
+    --------
+    >>> from sympy import Matrix, diag, symbols
+    >>> dt, q = symbols("dt q", positive=True)
+    >>> discrete_noise(Matrix([[0, 1], [0, 0]]), diag(0, q), dt)
+    Matrix([
+    [dt**3*q/3, dt**2*q/2],
+    [dt**2*q/2,      dt*q]])
+    """
+    _check_square("F", F)
+    if Q.shape != F.shape or not Q.is_symmetric():
+        raise ModelError(f"Q must be symmetric and {F.rows} x {F.rows}; it is {Q}")
+    tau = Symbol("tau", real=True)
+    Phi = transition_matrix(F, tau)
+    return (Phi * Q * Phi.T).applyfunc(lambda e: simplify(integrate(e, (tau, 0, dt))))
+
+
+def _check_square(name: str, matrix: Matrix) -> None:
+    if matrix.rows != matrix.cols:
+        raise ModelError(f"{name} must be square; it is {matrix.rows} x {matrix.cols}")

@@ -19,6 +19,7 @@ class Look:
     line: str = "solid"
     marker: str = ""
     width: float = 1.75
+    size: int = 5  # of a marker, in pt
 
 
 # By role, so that truth looks like truth on every chart; colours that the colour-blind tell apart.
@@ -30,6 +31,9 @@ LOOKS = {
     "free": Look("CC79A7", line="dash"),
     "first": Look("0072B2", marker="circle"),
     "second": Look("D55E00", marker="diamond"),
+    "line": Look("0072B2", width=1.25),
+    "second line": Look("D55E00", width=1.25),
+    "cloud": Look("E69F00", line="", marker="circle", size=2),  # hundreds of observations
     "band": Look("0072B2", line="dash", width=1.0),
     "second band": Look("D55E00", line="dash", width=1.0),
 }

@@ -25,6 +25,7 @@ from kfsheet.pythoncode import python_code
 
 LARGEST_NUMBER, LARGEST_DENOMINATOR = 12, 16
 FULL_CIRCLE = {60, 90, 180, 360}
+ENDLESS = 1_048_576  # more rows than a worksheet has
 
 
 def checked_expression(name: str, expression: Any) -> Expr:
@@ -122,9 +123,9 @@ def check_lags(name: str, expression: Expr, first_row: int, starts: int) -> None
             )
 
 
-def check_observed(name: str, expression: Expr, may_be_missing: Callable[[str], bool]) -> None:
+def check_observed(name: str, expression: Expr, gap_possible: Callable[[Indexed], bool]) -> None:
     """Refuse a formula that reads a value which may be missing without asking first."""
-    culprit = _unguarded(expression, frozenset(), may_be_missing)
+    culprit = _unguarded(expression, frozenset(), gap_possible)
     if culprit is not None:
         raise ModelError(
             f"{name} reads {culprit}, which may be missing; "
@@ -132,18 +133,18 @@ def check_observed(name: str, expression: Expr, may_be_missing: Callable[[str], 
         )
 
 
-def _unguarded(e: Basic, known: frozenset, may_be_missing: Callable[[str], bool]) -> Basic | None:
+def _unguarded(e: Basic, known: frozenset, gap_possible: Callable[[Indexed], bool]) -> Basic | None:
     if isinstance(e, Indexed):
-        return e if may_be_missing(str(e.base.label)) and e not in known else None
+        return e if e not in known and gap_possible(e) else None
     if isinstance(e, Observed | Aggregate):
         return None
     if isinstance(e, And):
         known |= _seen(e)
     if not isinstance(e, Piecewise):
-        return next(filter(None, (_unguarded(a, known, may_be_missing) for a in e.args)), None)
+        return next(filter(None, (_unguarded(a, known, gap_possible) for a in e.args)), None)
     for value, condition in e.args:
-        culprit = _unguarded(condition, known, may_be_missing)
-        culprit = culprit or _unguarded(value, known | _seen(condition), may_be_missing)
+        culprit = _unguarded(condition, known, gap_possible)
+        culprit = culprit or _unguarded(value, known | _seen(condition), gap_possible)
         if culprit is not None:
             return culprit
         known |= _seen_otherwise(condition)

@@ -36,6 +36,10 @@ class Exercise:
         What coursework asks for.
     notebook : str
         File name of the notebook that walks through it, if there is one.
+    sections : dict
+        What each worksheet holds, by its name.
+    greyed : str
+        A column that is 0 in rows that no longer count; they are shown in grey.
 
     Raises
     ------
@@ -50,6 +54,7 @@ class Exercise:
     questions: tuple[Question, ...] = ()
     notebook: str = ""
     sections: dict[str, str] = field(default_factory=dict)
+    greyed: str = ""
 
     def __post_init__(self) -> None:
         for name, kind in (("about", str), ("charts", Chart), ("questions", Question)):
@@ -64,6 +69,8 @@ class Exercise:
             chart.check(self.model)
         for question in self.questions:
             self._check_question(question)
+        if self.greyed:
+            self.model.column(self.greyed)
         if unknown := set(self.sections) - set(self.model.sections):
             raise ModelError(f"{self.name} has no section {unknown.pop()!r}")
 

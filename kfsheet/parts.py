@@ -10,6 +10,7 @@ from typing import Any
 from sympy import Expr, IndexedBase, Symbol
 
 from kfsheet.errors import DataError
+from kfsheet.expressions import Missing
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,7 @@ class Column:
     start: tuple[Expr, ...] = ()
     values: tuple[float, ...] | None = None
     may_be_missing: bool = False
+    """Whether data may have gaps, or the general expression may give no value."""
 
     @property
     def name(self) -> str:
@@ -90,6 +92,12 @@ class Column:
     def rules(self) -> tuple[Expr, ...]:
         """The expressions of the start rows and the general one; none for data."""
         return (*self.start, self.expression) if self.expression is not None else ()
+
+    def gap_possible(self, rows: range) -> bool:
+        """Whether a value may be missing in one of ``rows``."""
+        starts = self.start[rows.start : rows.stop]
+        general = rows.stop > len(self.start) and self.may_be_missing
+        return general or any(rule.has(Missing) for rule in starts)
 
     def definition(self, row: int) -> Expr | None:
         """The expression that holds in ``row``: a start value, or the general one."""

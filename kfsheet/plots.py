@@ -46,7 +46,7 @@ def draw(chart: Chart, frame: pd.DataFrame, ax: Axes | None = None) -> Axes:
             color=f"#{look.colour}",
             linestyle=LINES[look.line],
             marker=MARKERS[look.marker],
-            markersize=4,
+            markersize=look.size - 1,
             linewidth=look.width,
             label=series.label or "_",
         )

@@ -16,7 +16,7 @@ from sympy import Basic, Expr, Indexed, IndexedBase, Symbol
 
 from kfsheet import checks
 from kfsheet.errors import DataError, ModelError
-from kfsheet.expressions import Aggregate, ColumnBase, Last, Missing, column_references, t
+from kfsheet.expressions import Aggregate, ColumnBase, Last, Missing, column_references, lag, t
 from kfsheet.names import excel_name_problem, name_problem, section_problem
 from kfsheet.parts import Column, Parameter, Scalar, checked_values
 from kfsheet.schedule import Pass, schedule
@@ -65,6 +65,7 @@ class Recurrence:
         self.summaries: dict[str, Scalar] = {}
         self.table: dict[str, Column] = {}
         self.clock: Column | None = None
+        self._readers: dict[str, set[str]] = {}  # who reads a column
 
     def __repr__(self) -> str:
         return (
@@ -120,7 +121,10 @@ class Recurrence:
             raise ModelError(
                 f"summary {name} reads single rows; take Last, Mean, RMS, ... of columns"
             )
-        return self._add_scalar(self.summaries, name, expression, unit, description)
+        symbol = self._add_scalar(self.summaries, name, expression, unit, description)
+        for read in checks.columns_read(expression):
+            self._readers.setdefault(read, set()).add(name)
+        return symbol
 
     def data(
         self,
@@ -197,7 +201,6 @@ class Recurrence:
         rules = tuple(self._checked(column.name, rule) for rule in (*start, expression))
         for row, rule in enumerate(rules):
             checks.check_lags(column.name, rule, row, len(start))
-            checks.check_observed(column.name, rule, self._may_be_missing)
             self._check_summaries(column.name, rule)
         new = replace(
             column,
@@ -205,7 +208,7 @@ class Recurrence:
             description=description,
             expression=rules[-1],
             start=rules[:-1],
-            may_be_missing=any(rule.has(Missing) for rule in rules),
+            may_be_missing=rules[-1].has(Missing),
         )
         self._install(column, new)
 
@@ -377,20 +380,36 @@ class Recurrence:
         for symbol in checks.scalars(rule):
             summary = self.summaries.get(symbol.name)
             for last in summary.expression.atoms(Last) if summary else ():
-                if self._may_be_missing(str(last.args[0].label)):
+                if self.column(str(last.args[0].label)).may_be_missing:
                     raise ModelError(f"{name} reads {symbol}, which may be missing in the last row")
 
-    def _may_be_missing(self, name: str) -> bool:
-        return self.column(name).may_be_missing
+    def _check_observed(self, column: Column) -> None:
+        """Refuse a rule that reads a value which may be missing in the rows where it holds."""
+        for first, rule in enumerate(column.rules):
+            last = first if first < len(column.start) else checks.ENDLESS
+
+            def gap_possible(cell: Indexed, first: int = first, last: int = last) -> bool:
+                back = int(lag(cell))
+                read = self.column(str(cell.base.label))
+                return read.gap_possible(range(first - back, last - back + 1))
+
+            checks.check_observed(column.name, rule, gap_possible)
 
     def _install(self, old: Column, new: Column) -> None:
         """Put a column into the table, unless it breaks those that are there."""
         self.table[new.name] = new
+        reads = {name for rule in new.rules for name in checks.columns_read(rule)}
+        symbols = {s.name for rule in new.rules for s in checks.scalars(rule)}
+        readers = self._readers.get(new.name, set())
         try:
-            schedule(self)
-            for column in self.table.values():
-                for rule in column.rules:
-                    checks.check_observed(column.name, rule, self._may_be_missing)
+            self._check_observed(new)
+            # Only a column that something reads already, or a summary's reader, closes a circle.
+            if readers or new.name in reads or symbols & set(self.summaries):
+                schedule(self)
+            for name in readers & set(self.table):
+                self._check_observed(self.table[name])
         except ModelError:
             self.table[new.name] = old
             raise
+        for name in reads:
+            self._readers.setdefault(name, set()).add(new.name)

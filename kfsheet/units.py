@@ -21,9 +21,11 @@ from sympy import (
     Number,
     Piecewise,
     Pow,
+    Rational,
     atan2,
     ceiling,
     floor,
+    pi,
     sign,
 )
 from sympy.core.numbers import NumberSymbol
@@ -69,6 +71,15 @@ def parse_unit(text: str) -> Quantity:
     if quantity.magnitude != 1:
         raise ModelError(f"the unit {text!r} holds a number; a unit is like m, px, m/s2 or 1/s")
     return quantity
+
+
+def unit_text(quantity: Quantity) -> str:
+    """The text that :func:`parse_unit` reads, of a product or quotient of units.
+
+    >>> unit_text(parse_unit("m/s") * parse_unit("m"))
+    'm2/s'
+    """
+    return f"{quantity.units:~C}".replace("**", "").replace("pixel", "px").replace("*", " ")
 
 
 def pretty_unit(text: str) -> str:
@@ -167,6 +178,8 @@ class UnitWalker:
             if unit is None:
                 return None
             result = result * unit
+        if e.has(pi) and e.as_coeff_Mul()[0] == Rational(1, 180) and "degree" in _names(result):
+            return result * parse_unit("rad") / parse_unit("deg")  # pi/180 is a conversion here
         return result
 
     def _power(self, e: Pow) -> Quantity | None:
@@ -214,6 +227,10 @@ class UnitWalker:
         if one.dimensionality != two.dimensionality:
             return False
         return abs((one / two).to_base_units().magnitude - 1) < 1e-9
+
+
+def _names(quantity: Quantity) -> set[str]:
+    return {name for name, _ in quantity.unit_items()}
 
 
 def show(unit: Quantity) -> str:

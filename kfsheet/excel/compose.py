@@ -177,8 +177,10 @@ def _line(page: Page, row: int, column: int, item: Any, value: Piece) -> None:
 def plotted(exercise: Exercise) -> list[str]:
     """Formula columns on charts that may have no value; a chart would show their "" as 0."""
     names = [n for chart in exercise.charts for s in chart.series for n in (s.x, s.y)]
-    gaps = [n for n in dict.fromkeys(names) if exercise.model.column(n).may_be_missing]
-    return [n for n in gaps if not exercise.model.column(n).is_data]
+    columns = {name: exercise.model.column(name) for name in names}
+    return [
+        n for n, c in columns.items() if any(r is not Missing and r.has(Missing) for r in c.rules)
+    ]
 
 
 PLOTTED_COLUMN = 27  # AA: to the right of the charts

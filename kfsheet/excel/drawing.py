@@ -87,7 +87,7 @@ def _series(book: Workbook, exercise: Exercise, layout: Layout, series: Series) 
     native.graphicalProperties = _line(look)
     native.marker.symbol = look.marker or "none"
     if look.marker:
-        native.marker.size = 5
+        native.marker.size = look.size
         native.marker.graphicalProperties = GraphicalProperties(solidFill=look.colour)
         native.marker.graphicalProperties.line.solidFill = look.colour
     native.smooth = False

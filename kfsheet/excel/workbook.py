@@ -6,7 +6,7 @@ from io import BytesIO
 from pathlib import Path
 
 from openpyxl import Workbook
-from openpyxl.formatting.rule import CellIsRule
+from openpyxl.formatting.rule import CellIsRule, FormulaRule
 from openpyxl.packaging.custom import StringProperty
 from openpyxl.styles import Font, PatternFill
 from openpyxl.utils import get_column_letter, quote_sheetname
@@ -61,6 +61,8 @@ def workbook_bytes(exercise: Exercise) -> bytes:
     _define_names(book, layout, pages)
     _add_validations(book["Parameters"], layout)
     _colour_verdict(book["Check"])
+    if exercise.greyed:
+        _grey_rows(book, layout, exercise.greyed)
     draw(book, exercise, layout)
     _describe(book, exercise)
     saved = BytesIO()
@@ -162,6 +164,17 @@ def _colour_verdict(sheet: Worksheet) -> None:
         fill = PatternFill("solid", start_color="FF" + colour, end_color="FF" + colour)
         rule = CellIsRule(operator="equal", formula=[f'"{word}"'], fill=fill, font=Font(bold=True))
         sheet.conditional_formatting.add("B4", rule)
+
+
+def _grey_rows(book: Workbook, layout: Layout, name: str) -> None:
+    """Grey text in rows in which a column is 0, on every sheet of the recurrence."""
+    home, column = layout.home(name)
+    cell = f"{quote_sheetname(home)}!${get_column_letter(column)}{FIRST_ROW}"
+    for section, columns in layout.columns.items():
+        last = get_column_letter(max(columns.values()))
+        rule = FormulaRule(formula=[f"{cell}=0"], font=Font(color="FFBFBFBF"))
+        area = f"A{FIRST_ROW}:{last}{layout.last_row}"
+        book[section].conditional_formatting.add(area, rule)
 
 
 def _describe(book: Workbook, exercise: Exercise) -> None:
