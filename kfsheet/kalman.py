@@ -335,7 +335,7 @@ class _Definitions:
     def innovation(
         self, o: Observation, k: int
     ) -> Generator[Definition, None, tuple[Matrix, Indexed]]:
-        """Columns d = y - h(x_f) and H at x_f; returns H and the cell of the innovation to weigh."""
+        """Columns d = y - h(x_f) and H at x_f; returns H and the innovation to weigh."""
         x_f, unit = [self.cell(f"{name}_f") for name in self.names], parse_unit(o.unit)
         d = o.value - self.at(o.predicted, x_f)
         d = self.guarded(wrapped(d) if o.angle else d, self.gaps(o.value))

@@ -81,7 +81,7 @@ class Column:
     @property
     def name(self) -> str:
         """The name, and the header in a workbook."""
-        return str(self.base.label)
+        return self.base.label.name
 
     @property
     def is_data(self) -> bool:

@@ -44,9 +44,11 @@ class Comparison:
     def run(self, pages: list[Page]) -> None:
         """Compare every formula cell, then look for the culprits among those that differ."""
         for page in pages:
+            cells = self.book[page.title]._cells if page.title in self.book else {}
             for (row, column), piece in page.pieces.items():
-                self._compare((page.title, row, column), piece)
-        homes = self._homes()
+                content = cells[row, column].value if (row, column) in cells else None
+                self._compare((page.title, row, column), piece, content)
+        homes = self._homes() if self.differing else {}
         blind = []
         for address, piece in self.differing.items():
             if address in self.problems:
@@ -59,9 +61,7 @@ class Comparison:
             if self._text(address) != _plain(piece.content) or not self.problems:
                 self.problems[address] = self._words(piece.stored, address)
 
-    def _compare(self, address: Address, piece: Piece) -> None:
-        sheet, row, column = address
-        content = self.book[sheet].cell(row, column).value if sheet in self.book else None
+    def _compare(self, address: Address, piece: Piece, content: Any) -> None:
         if is_formula(piece.content):
             self.cells += 1
             if not is_formula(content):

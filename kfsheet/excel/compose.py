@@ -108,9 +108,9 @@ def _head(page: Page, at: int, symbol: str, unit: str, words: str, width: float 
 def _data_column(page: Page, column: Column, at: int, now: Run) -> None:
     _head(page, at, column.name, column.unit, column.description)
     values = now.columns[column.name]
+    shape = number_format(values)
     for row, value in enumerate(values, FIRST_ROW):
-        content = None if isnan(value) else value
-        page.put(row, at, content, "data", format=number_format(values))
+        page.put(row, at, None if isnan(value) else value, "data", format=shape)
 
 
 def _formula_column(page: Page, layout: Layout, column: Column, at: int, now: Run) -> None:
@@ -198,12 +198,12 @@ def charts_page(exercise: Exercise, layout: Layout, now: Run) -> Page:
         _head(page, at, name, column.unit, "plotted")
         sheet, number = layout.home(name)
         letter, values = get_column_letter(number), now.columns[name]
-        shape = number_format(values)
+        shape, size = number_format(values), rms(values)
         for row, value in enumerate(values, FIRST_ROW):
             cell = f"{quote(sheet)}!{letter}{row}"
             text = f"=IF(ISNUMBER({cell}),{cell},NA())"
             shown = stored(value, NOT_AVAILABLE)
-            page.put(row, at, text, "formula", stored=shown, format=shape, scale=rms(values))
+            page.put(row, at, text, "formula", stored=shown, format=shape, scale=size)
     return page
 
 

@@ -17,7 +17,7 @@ from xml.sax.saxutils import escape
 EPOCH = (1980, 1, 1, 0, 0, 0)
 FORMULA = re.compile(r'<c r="([A-Z]+\d+)"([^>]*)><f>(.*?)</f><v ?/?>(?:</v>)?</c>', re.DOTALL)
 # An empty cell that is typed as a number is read as 0 by some programs.
-EMPTY = re.compile(r'(<c r="[A-Z]+\d+"(?: s="\d+")?) t="n"( ?/>)')
+EMPTY = re.compile(r'(<c r="[A-Z]+\d+"(?: s="\d+")?) t="n"(?: ?/>|></c>)')
 MOMENT = re.compile(r"(<dcterms:(created|modified)[^>]*>)[^<]*(</dcterms:\2>)")
 # Every program that saves a workbook writes its own name here.
 PROGRAM = re.compile(rb"(<Application>)[^<]*(</Application>)")
@@ -53,7 +53,7 @@ def _with_values(xml: str, values: Mapping[str, Value]) -> str:
         kind, text = _typed(values[address])
         return f'<c r="{address}"{attributes}{kind}><f>{formula}</f><v>{text}</v></c>'
 
-    return EMPTY.sub(r"\1\2", FORMULA.sub(cell, xml))
+    return EMPTY.sub(r"\1 />", FORMULA.sub(cell, xml))
 
 
 def _typed(value: Value) -> tuple[str, str]:

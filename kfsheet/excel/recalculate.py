@@ -38,7 +38,7 @@ CELL = re.compile(rb"<((?:\w+:)?c)((?:\s[^>]*[^>/])?)>(.*?)</\1>", re.DOTALL)
 VALUE = re.compile(rb"<((?:\w+:)?v)\b[^>]*?(?:/>|>.*?</\1>)", re.DOTALL)
 TYPE = re.compile(rb'\s+t="[^"]*"')
 # openpyxl types an empty cell as a number, and IronCalc then reads a 0: a photo that is not there.
-EMPTY = re.compile(rb'(<(?:\w+:)?c\s[^>]*?)\s+t="n"(\s*/>)')
+EMPTY = re.compile(rb'(<(?:\w+:)?c\s[^>]*?)\s+t="n"(\s*/>|></(?:\w+:)?c>)')
 ADDRESS = re.compile(rb'\sr="([A-Z]+\d+)"')
 MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
 LINKS = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
