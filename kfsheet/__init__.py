@@ -11,8 +11,8 @@ from typing import Any
 __version__ = "0.1.0"
 
 _HOMES = {
-    "kfsheet.algebra": "analysis correlated_covariance diagonal_analysis gain_limits "
-    "sequential_gain",
+    "kfsheet.algebra": "analysis correlated_covariance diagonal_analysis discrete_noise "
+    "gain_limits sequential_gain transition_matrix transition_matrix_laplace",
     "kfsheet.charts": "Chart Series",
     "kfsheet.errors": "DataError EngineError KfsheetError ModelError PrintError WorkbookError",
     "kfsheet.evaluation": "evaluate",
@@ -24,6 +24,7 @@ _HOMES = {
     "kfsheet.exercises": "exercise_names load_exercise",
     "kfsheet.expressions": "Count Largest Last Mean Missing Observed RMS Smallest Std Sum "
     "SumProduct t when_observed",
+    "kfsheet.kalman": "Observation State StateSpace add_filter",
     "kfsheet.latex": "latex_code",
     "kfsheet.plots": "draw",
     "kfsheet.pythoncode": "python_code python_source",

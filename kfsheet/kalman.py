@@ -19,42 +19,16 @@ sequential update: A. H. Jazwinski, Stochastic Processes and Filtering Theory, s
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
 
-from sympy import (
-    Add,
-    And,
-    Expr,
-    Indexed,
-    Matrix,
-    Mod,
-    Or,
-    Piecewise,
-    S,
-    Symbol,
-    expand,
-    pi,
-    zeros,
-)
+from sympy import Expr, Matrix, Symbol, sympify
 
-from kfsheet.checks import ENDLESS
 from kfsheet.errors import ModelError
-from kfsheet.expressions import (
-    ColumnBase,
-    Missing,
-    Observed,
-    column_references,
-    t,
-    when_observed,
-)
+from kfsheet.expressions import t
+from kfsheet.filter_columns import FilterColumns
 from kfsheet.recurrence import Recurrence
-from kfsheet.units import parse_unit, unit_text
-
-MOST_TERMS = 6  # of a product of matrices within one formula; more get columns of their own
 
 
 @dataclass(frozen=True)
@@ -75,6 +49,9 @@ class State:
     description: str
     start: Expr
     variance: Expr
+
+    def __post_init__(self) -> None:
+        _sympify(self, "start", "variance")
 
 
 @dataclass(frozen=True)
@@ -103,6 +80,9 @@ class Observation:
     variance: Expr
     unit: str
     angle: bool = False
+
+    def __post_init__(self) -> None:
+        _sympify(self, "value", "predicted", "variance")
 
 
 @dataclass(frozen=True)
@@ -133,6 +113,8 @@ class StateSpace:
 
     def __post_init__(self) -> None:
         n = len(self.state)
+        if n == 0:
+            raise ModelError("the state has no elements")
         if len(self.transition) != n:
             raise ModelError(f"the state has {n} elements but the transition {self.transition}")
         if self.Q.shape != (n, n) or not self.Q.is_symmetric():
@@ -140,6 +122,9 @@ class StateSpace:
         names = [o.name for o in self.observations]
         if not names or len(set(names)) < len(names):
             raise ModelError(f"give one or more observations of different names, not {names}")
+        for k, o in enumerate(self.observations):
+            if self.H[k, :].is_zero_matrix:
+                raise ModelError(f"observation {o.name} depends on no element of the state")
 
     @cached_property
     def F(self) -> Matrix:
@@ -152,14 +137,10 @@ class StateSpace:
         return Matrix([o.predicted for o in self.observations]).jacobian(list(self.state))
 
 
-def wrapped(angle: Expr) -> Expr:
-    """The same direction within (-pi, pi].
-
-    >>> from sympy import Rational, pi
-    >>> wrapped(Rational(3, 2) * pi), wrapped(-pi)
-    (-pi/2, pi)
-    """
-    return pi - Mod(pi - angle, 2 * pi)
+def _sympify(thing: State | Observation, *names: str) -> None:
+    """Plain numbers are welcome where formulas are."""
+    for name in names:
+        object.__setattr__(thing, name, sympify(getattr(thing, name)))
 
 
 def add_filter(m: Recurrence, model: StateSpace, *, section: str, suffix: str = "") -> None:
@@ -189,278 +170,7 @@ def add_filter(m: Recurrence, model: StateSpace, *, section: str, suffix: str = 
     ModelError
         If a name is taken, or an expression reads what the recurrence does not know.
     """
-    definitions = list(_Definitions(m, model, suffix))
+    definitions = list(FilterColumns(m, model, suffix))
     m.columns(*(d.name for d in definitions), section=section)
     for d in definitions:
         m.define(m[d.name][t], d.rule, d.unit, d.words, start=[d.start])
-
-
-class Definition(NamedTuple):
-    """One column: name, general expression, unit, words, and what stands in row 0."""
-
-    name: str
-    rule: Expr
-    unit: str
-    words: str
-    start: Expr = Missing
-
-
-class _Definitions:
-    """The columns of a filter, in the order of its equations.
-
-    ``x`` and ``P`` are the cells that hold the state and its covariance so far: after the forecast
-    (names end in ``_f``), after some of the observations (``_1``, ``_2``, ...), and at last the
-    analysis (``_a``). A covariance that is 0 for ever, and a gain that is, have no columns: what
-    does not depend on each other falls apart into filters of its own.
-    """
-
-    def __init__(self, m: Recurrence, model: StateSpace, suffix: str) -> None:
-        self.m, self.model, self.suffix = m, model, suffix
-        self.names = [symbol.name for symbol in model.state]
-        self.elements = list(model.state.values())
-        self.units = [parse_unit(element.unit) for element in self.elements]
-        self.related = _related(model)
-        self.weighed: list[tuple[Indexed, Indexed, tuple[Indexed, ...]]] = []
-        self.x = [self.cell(f"{name}_f") for name in self.names]
-        self.P = self.covariances("f")
-
-    def __iter__(self) -> Iterator[Definition]:
-        yield from self.forecast()
-        for k, observation in enumerate(self.model.observations):
-            h, d = yield from self.innovation(observation, k)
-            yield from self.update(observation, k, h, d)
-        yield from self.unobserved()
-        yield self.nis()
-
-    # -- cells -----------------------------------------------------------------------------
-
-    @property
-    def all(self) -> range:
-        """Indices of the state."""
-        return range(len(self.names))
-
-    def pairs(self) -> Iterator[tuple[int, int]]:
-        """Indices of the upper triangle, without those that are 0 for ever."""
-        return ((i, j) for i in self.all for j in self.all[i:] if (i, j) in self.related)
-
-    def touched(self, k: int) -> list[int]:
-        """Elements that observation k moves."""
-        h = self.model.H[k, :]
-        return [i for i in self.all if any(h[j] != 0 and (i, j) in self.related for j in self.all)]
-
-    def cell(self, name: str, back: int = 0) -> Indexed:
-        return ColumnBase(name + self.suffix, real=True)[t - back]
-
-    def P_name(self, i: int, j: int, stage: str) -> str:
-        return f"P_{self.names[min(i, j)]}{self.names[max(i, j)]}_{stage}"
-
-    def covariances(self, stage: str, back: int = 0) -> Matrix:
-        def entry(i: int, j: int) -> Expr:
-            known = (i, j) in self.related
-            return self.cell(self.P_name(i, j, stage), back) if known else S.Zero
-
-        return Matrix(len(self.all), len(self.all), entry)
-
-    def at(self, expression: Expr, cells: Sequence[Expr]) -> Expr:
-        """An expression in the symbols of the state, with cells in their place."""
-        return expression.xreplace(dict(zip(self.model.state, cells, strict=True)))
-
-    def gaps(self, expression: Expr) -> tuple[Indexed, ...]:
-        """Cells in an expression that may be missing from row 1 on."""
-        cells = sorted(column_references(expression), key=str)
-        after = range(1, ENDLESS)
-        return tuple(c for c in cells if self.m.column(str(c.base.label)).gap_possible(after))
-
-    def column(
-        self, name: str, rule: Expr, unit: Any, words: str, start: Expr = Missing
-    ) -> Definition:
-        return Definition(name + self.suffix, rule, unit_text(unit), words, start)
-
-    def covariance(self, i: int, j: int, stage: str, rule: Expr, start: Expr) -> Definition:
-        pair = f"variance of {self.names[i]}"
-        if i != j:
-            pair = f"covariance of {self.names[i]} and {self.names[j]}"
-        unit = self.units[i] * self.units[j]
-        return self.column(self.P_name(i, j, stage), rule, unit, f"{_when(stage)}: {pair}", start)
-
-    def derivative(
-        self, name: str, entry: Expr, cells: Sequence[Expr], unit: Any, words: str
-    ) -> Generator[Definition, None, Expr]:
-        """An entry of a Jacobian: a constant stays where it is used, others get a column."""
-        if not entry.free_symbols & set(self.model.state):
-            return entry
-        yield self.column(name, self.at(entry, cells), unit, words)
-        return self.cell(name)
-
-    # -- forecast --------------------------------------------------------------------------
-
-    def forecast(self) -> Iterator[Definition]:
-        """x_f = f(x_a) and P_f = F P_a F' + Q."""
-        x_a = [self.cell(f"{name}_a", back=1) for name in self.names]
-        F = zeros(len(self.all), len(self.all))
-        for i, j in itertools.product(self.all, repeat=2):
-            to, of = self.names[i], self.names[j]
-            F[i, j] = yield from self.derivative(
-                f"F_{to}_{of}",
-                self.model.F[i, j],
-                x_a,
-                self.units[i] / self.units[j],
-                f"derivative of the next {to} with respect to {of}",
-            )
-        for name, element, unit, rule in zip(
-            self.names, self.elements, self.units, self.model.transition, strict=True
-        ):
-            words = f"forecast: {element.description}"
-            yield self.column(f"{name}_f", self.at(rule, x_a), unit, words, element.start)
-        yield from self.forecast_covariance(F, self.model.Q.applyfunc(lambda e: self.at(e, x_a)))
-
-    def forecast_covariance(self, F: Matrix, Q: Matrix) -> Iterator[Definition]:
-        FP = F * self.covariances("a", back=1)
-        P_f = (FP * F.T).applyfunc(expand)
-        if max(map(_terms, P_f)) > MOST_TERMS:
-            for i, j in itertools.product(self.all, repeat=2):
-                if FP[i, j] == 0:
-                    continue
-                name = f"FP_{self.names[i]}_{self.names[j]}"
-                unit = self.units[i] * self.units[j]
-                yield self.column(name, expand(FP[i, j]), unit, "F P_a, on the way to F P_a F'")
-                FP[i, j] = self.cell(name)
-            P_f = FP * F.T
-        for i, j in self.pairs():
-            start = self.elements[i].variance if i == j else S.Zero
-            yield self.covariance(i, j, "f", P_f[i, j] + Q[i, j], start)
-
-    # -- observations ----------------------------------------------------------------------
-
-    def innovation(
-        self, o: Observation, k: int
-    ) -> Generator[Definition, None, tuple[Matrix, Indexed]]:
-        """Columns d = y - h(x_f) and H at x_f; returns H and the innovation to weigh."""
-        x_f, unit = [self.cell(f"{name}_f") for name in self.names], parse_unit(o.unit)
-        d = o.value - self.at(o.predicted, x_f)
-        d = self.guarded(wrapped(d) if o.angle else d, self.gaps(o.value))
-        words = f"innovation: {o.name} observed - {o.name} of the forecast"
-        yield self.column(f"d_{o.name}", d, unit, words)
-        h = zeros(1, len(self.all))
-        for j, name in enumerate(self.names):
-            h[j] = yield from self.derivative(
-                f"H_{o.name}_{name}",
-                self.model.H[k, j],
-                x_f,
-                unit / self.units[j],
-                f"derivative of {o.name} with respect to {name}, at the forecast",
-            )
-        moved = [now - before for now, before in zip(self.x, x_f, strict=True)]
-        if all(h[j] == 0 or moved[j] == 0 for j in self.all):
-            return h, self.cell(f"d_{o.name}")
-        yield from self.left(o, h, moved)
-        return h, self.cell(f"d_{o.name}_left")
-
-    def left(self, o: Observation, h: Matrix, moved: Sequence[Expr]) -> Iterator[Definition]:
-        """What the observations before have left of d, and the variance of d itself."""
-        unit, d = parse_unit(o.unit), self.cell(f"d_{o.name}")
-        rest = d - sum(slope * move for slope, move in zip(h, moved, strict=True))
-        asked = (d,) if self.gaps(o.value) else ()
-        words = f"what the observations before have left of {d.base}"
-        yield self.column(f"d_{o.name}_left", self.guarded(rest, asked), unit, words)
-        variance = expand((h * self.covariances("f") * h.T)[0]) + o.variance
-        rule = self.guarded(variance, self.gaps(o.variance))
-        yield self.column(f"S_{o.name}_f", rule, unit**2, f"variance of {d.base} itself")
-
-    def update(self, o: Observation, k: int, h: Matrix, d: Indexed) -> Iterator[Definition]:
-        """S = h P h' + r, K = P h' / S, x <- x + K d, P <- P - K S K'."""
-        unit, touched = parse_unit(o.unit), self.touched(k)
-        Ph = self.P * h.T
-        if sum(entry != 0 for entry in h) > 2:
-            for i in touched:
-                words = f"covariance of {self.names[i]} with the {o.name} that is expected"
-                name = f"PH_{self.names[i]}_{o.name}"
-                yield self.column(name, Ph[i], self.units[i] * unit, words)
-                Ph[i] = self.cell(name)
-        S_o = self.cell(f"S_{o.name}")
-        asked = (d,) if self.gaps(o.value) else ()
-        asked = (d, S_o) if self.gaps(o.variance) else asked
-        self.weighed.append((d, S_o, asked))
-        variance = self.guarded(expand((h * Ph)[0]) + o.variance, self.gaps(o.variance))
-        yield self.column(f"S_{o.name}", variance, unit**2, f"variance of {d.base}")
-        K = {i: self.cell(f"K_{self.names[i]}_{o.name}") for i in touched}
-        for i in touched:
-            gain = self.guarded(Ph[i] / S_o, asked, S.Zero)
-            words = f"gain: {self.names[i]} for one unit of {d.base}"
-            yield self.column(f"K_{self.names[i]}_{o.name}", gain, self.units[i] / unit, words)
-        for i in touched:
-            stage = self.stage(k, i)
-            rule = self.guarded(self.x[i] + K[i] * d, asked and (d,), self.x[i])
-            words = f"{_when(stage)}: {self.elements[i].description}"
-            start = self.cell(f"{self.names[i]}_f") if stage == "a" else Missing
-            yield self.column(f"{self.names[i]}_{stage}", rule, self.units[i], words, start)
-            self.x[i] = self.cell(f"{self.names[i]}_{stage}")
-        for i, j in self.pairs():
-            if i in K and j in K:
-                stage = self.stage(k, i, j)
-                rule = self.P[i, j] - K[i] * K[j] * S_o
-                rule = self.guarded(rule, (S_o,) if self.gaps(o.variance) else (), self.P[i, j])
-                start = self.cell(self.P_name(i, j, "f")) if stage == "a" else Missing
-                yield self.covariance(i, j, stage, rule, start)
-                self.P[i, j] = self.P[j, i] = self.cell(self.P_name(i, j, stage))
-
-    def stage(self, k: int, *elements: int) -> str:
-        """Where observation k brings some elements: to the analysis, if it is the last for them."""
-        later = range(k + 1, len(self.model.observations))
-        return str(k + 1) if any(set(elements) <= set(self.touched(n)) for n in later) else "a"
-
-    def unobserved(self) -> Iterator[Definition]:
-        """The analysis of what no observation moves is the forecast."""
-        known = [set(self.touched(k)) for k in range(len(self.model.observations))]
-        for i, j in self.pairs():
-            if any({i, j} <= those for those in known):
-                continue
-            if i == j:
-                words = f"analysis: {self.elements[i].description}"
-                x_f = self.cell(f"{self.names[i]}_f")
-                yield self.column(f"{self.names[i]}_a", x_f, self.units[i], words, x_f)
-            forecast = self.cell(self.P_name(i, j, "f"))
-            yield self.covariance(i, j, "a", forecast, forecast)
-
-    def nis(self) -> Definition:
-        """The sum of d^2/S over the observations that are there."""
-        parts = [
-            self.guarded(d**2 / S_o, asked, S.Zero if len(self.weighed) > 1 else Missing)
-            for d, S_o, asked in self.weighed
-        ]
-        rule = Add(*parts)
-        seen = [And(*map(Observed, asked)) for _, _, asked in self.weighed]
-        if len(parts) > 1 and Or(*seen) != True:  # noqa: E712 - a SymPy condition
-            rule = Piecewise((rule, Or(*seen)), (Missing, True))
-        words = f"normalised innovation squared; expected: {len(parts)}"
-        return self.column("NIS", rule, parse_unit(""), words)
-
-    @staticmethod
-    def guarded(rule: Expr, cells: tuple[Indexed, ...], otherwise: Expr = Missing) -> Expr:
-        return when_observed(cells, rule, otherwise) if cells else rule
-
-
-def _related(model: StateSpace) -> set[tuple[int, int]]:
-    """Pairs of elements whose covariance does not stay 0 for ever."""
-    every = list(itertools.product(range(len(model.state)), repeat=2))
-    nonzero_F = {(i, j) for i, j in every if model.F[i, j] != 0}
-    nonzero_H = [{j for _, j in every if model.H[k, j] != 0} for k in range(model.H.rows)]
-    found = {(i, i) for i, _ in every} | {(i, j) for i, j in every if model.Q[i, j] != 0}
-    while True:
-        # F P F' relates i and j if they come from k and l that are related.
-        new = {(i, j) for i, k in nonzero_F for j, m in nonzero_F if (k, m) in found}
-        for seen in nonzero_H:
-            moved = {i for i, j in found if j in seen}
-            new |= set(itertools.product(moved, repeat=2))
-        if new <= found:
-            return found
-        found |= new
-
-
-def _terms(expression: Expr) -> int:
-    return len(Add.make_args(expression))
-
-
-def _when(stage: str) -> str:
-    words = {"f": "forecast", "a": "analysis", "1": "after the first observation"}
-    return words.get(stage, f"after {stage} observations")

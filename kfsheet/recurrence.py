@@ -166,9 +166,11 @@ class Recurrence:
         """Announce columns, in the order in which they stand on the worksheet ``section``."""
         if problem := section_problem(section, {c.section for c in self.table.values()}):
             raise ModelError(f"section {section!r}: {problem}")
-        for name in names:
-            if problem := name_problem(name) or self._taken(name):
+        for n, name in enumerate(names):
+            taken = "the name is taken" if name in names[:n] else self._taken(name)
+            if problem := name_problem(name) or taken:
                 raise ModelError(f"column {name!r}: {problem}")
+        for name in names:
             self.table[name] = Column(ColumnBase(name, real=True), section)
         return tuple(self.table[name].base for name in names)
 

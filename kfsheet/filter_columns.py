@@ -1,0 +1,337 @@
+"""The columns of a Kalman filter, definition by definition; see :mod:`kfsheet.kalman`."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Generator, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from sympy import Add, And, Expr, Indexed, Matrix, Mod, Or, Piecewise, S, expand, pi, zeros
+
+from kfsheet.checks import ENDLESS
+from kfsheet.expressions import (
+    ColumnBase,
+    Missing,
+    Observed,
+    column_references,
+    t,
+    when_observed,
+)
+from kfsheet.units import parse_unit, unit_text
+
+if TYPE_CHECKING:
+    from kfsheet.kalman import Observation, StateSpace
+    from kfsheet.recurrence import Recurrence
+
+MOST_TERMS = 6  # of a product of matrices within one formula; more get columns of their own
+
+
+def wrapped(angle: Expr) -> Expr:
+    """The same direction within (-pi, pi].
+
+    >>> from sympy import Rational, pi
+    >>> wrapped(Rational(3, 2) * pi), wrapped(-pi)
+    (-pi/2, pi)
+    """
+    return pi - Mod(pi - angle, 2 * pi)
+
+
+class Definition(NamedTuple):
+    """One column: name, general expression, unit, words, and what stands in row 0."""
+
+    name: str
+    rule: Expr
+    unit: str
+    words: str
+    start: Expr = Missing
+
+
+class FilterColumns:
+    """The columns of a filter, in the order of its equations.
+
+    ``x`` and ``P`` are the cells that hold the state and its covariance so far: after the forecast
+    (names end in ``_f``), after some of the observations (``_1``, ``_2``, ...), and at last the
+    analysis (``_a``). A covariance that is 0 for ever, and a gain that is, have no columns: what
+    does not depend on each other falls apart into filters of its own.
+    """
+
+    def __init__(self, m: Recurrence, model: StateSpace, suffix: str) -> None:
+        self.m, self.model, self.suffix = m, model, suffix
+        self.names = [symbol.name for symbol in model.state]
+        self.elements = list(model.state.values())
+        self.units = [parse_unit(element.unit) for element in self.elements]
+        self.related = _related(model)
+        self.weighed: list[tuple[Indexed, Indexed, tuple[Indexed, ...]]] = []
+        self.x = [self.cell(f"{name}_f") for name in self.names]
+        self.P = self.covariances("f")
+
+    def __iter__(self) -> Iterator[Definition]:
+        yield from self.forecast()
+        for k, observation in enumerate(self.model.observations):
+            h, d = yield from self.innovation(observation, k)
+            yield from self.update(observation, k, h, d)
+        yield from self.unobserved()
+        yield self.nis()
+
+    # -- cells -----------------------------------------------------------------------------
+
+    @property
+    def all(self) -> range:
+        """Indices of the state."""
+        return range(len(self.names))
+
+    def pairs(self) -> Iterator[tuple[int, int]]:
+        """Indices of the upper triangle, without those that are 0 for ever."""
+        return ((i, j) for i in self.all for j in self.all[i:] if (i, j) in self.related)
+
+    def touched(self, k: int) -> list[int]:
+        """Elements that observation k moves."""
+        h = self.model.H[k, :]
+        return [i for i in self.all if any(h[j] != 0 and (i, j) in self.related for j in self.all)]
+
+    def cell(self, name: str, back: int = 0) -> Indexed:
+        """Cell of a column of this filter, ``back`` rows above."""
+        return ColumnBase(name + self.suffix, real=True)[t - back]
+
+    def P_name(self, i: int, j: int, stage: str) -> str:
+        """Name of an entry of a covariance."""
+        return f"P_{self.names[min(i, j)]}{self.names[max(i, j)]}_{stage}"
+
+    def covariances(self, stage: str, back: int = 0) -> Matrix:
+        """Cells of a covariance, with 0 for what stays 0."""
+
+        def entry(i: int, j: int) -> Expr:
+            known = (i, j) in self.related
+            return self.cell(self.P_name(i, j, stage), back) if known else S.Zero
+
+        return Matrix(len(self.all), len(self.all), entry)
+
+    def at(self, expression: Expr, cells: Sequence[Expr]) -> Expr:
+        """An expression in the symbols of the state, with cells in their place."""
+        return expression.xreplace(dict(zip(self.model.state, cells, strict=True)))
+
+    def gaps(self, expression: Expr) -> tuple[Indexed, ...]:
+        """Cells in an expression that may be missing from row 1 on."""
+        cells = sorted(column_references(expression), key=str)
+        after = range(1, ENDLESS)
+        return tuple(c for c in cells if self.m.column(str(c.base.label)).gap_possible(after))
+
+    def column(
+        self, name: str, rule: Expr, unit: Any, words: str, start: Expr = Missing
+    ) -> Definition:
+        """A definition, its name with the suffix."""
+        return Definition(name + self.suffix, rule, unit_text(unit), words, start)
+
+    def covariance(self, i: int, j: int, stage: str, rule: Expr, start: Expr) -> Definition:
+        """An entry of a covariance at a stage."""
+        pair = f"variance of {self.names[i]}"
+        if i != j:
+            pair = f"covariance of {self.names[i]} and {self.names[j]}"
+        unit = self.units[i] * self.units[j]
+        return self.column(self.P_name(i, j, stage), rule, unit, f"{_when(stage)}: {pair}", start)
+
+    def derivative(
+        self, name: str, entry: Expr, cells: Sequence[Expr], unit: Any, words: str
+    ) -> Generator[Definition, None, Expr]:
+        """An entry of a Jacobian: a constant stays where it is used, others get a column."""
+        if not entry.free_symbols & set(self.model.state):
+            return entry
+        yield self.column(name, self.at(entry, cells), unit, words)
+        return self.cell(name)
+
+    # -- forecast --------------------------------------------------------------------------
+
+    def forecast(self) -> Iterator[Definition]:
+        """x_f = f(x_a) and P_f = F P_a F' + Q."""
+        x_a = [self.cell(f"{name}_a", back=1) for name in self.names]
+        F = zeros(len(self.all), len(self.all))
+        for i, j in itertools.product(self.all, repeat=2):
+            to, of = self.names[i], self.names[j]
+            F[i, j] = yield from self.derivative(
+                f"F_{to}_{of}",
+                self.model.F[i, j],
+                x_a,
+                self.units[i] / self.units[j],
+                f"derivative of the next {to} with respect to {of}",
+            )
+        for name, element, unit, rule in zip(
+            self.names, self.elements, self.units, self.model.transition, strict=True
+        ):
+            words = f"forecast: {element.description}"
+            yield self.column(f"{name}_f", self.at(rule, x_a), unit, words, element.start)
+        yield from self.forecast_covariance(F, self.model.Q.applyfunc(lambda e: self.at(e, x_a)))
+
+    def forecast_covariance(self, F: Matrix, Q: Matrix) -> Iterator[Definition]:
+        """P_f = F P_a F' + Q, the upper triangle."""
+        FP = F * self.covariances("a", back=1)
+        P_f = (FP * F.T).applyfunc(expand)
+        if max(map(_terms, P_f)) > MOST_TERMS:
+            for i, j in itertools.product(self.all, repeat=2):
+                if FP[i, j] == 0:
+                    continue
+                name = f"FP_{self.names[i]}_{self.names[j]}"
+                unit = self.units[i] * self.units[j]
+                yield self.column(name, expand(FP[i, j]), unit, "F P_a, on the way to F P_a F'")
+                FP[i, j] = self.cell(name)
+            P_f = FP * F.T
+        for i, j in self.pairs():
+            start = self.elements[i].variance if i == j else S.Zero
+            yield self.covariance(i, j, "f", P_f[i, j] + Q[i, j], start)
+
+    # -- observations ----------------------------------------------------------------------
+
+    def innovation(
+        self, o: Observation, k: int
+    ) -> Generator[Definition, None, tuple[Matrix, Indexed]]:
+        """Columns d = y - h(x_f) and H at x_f; returns H and the innovation to weigh."""
+        x_f, unit = [self.cell(f"{name}_f") for name in self.names], parse_unit(o.unit)
+        d = o.value - self.at(o.predicted, x_f)
+        d = self.guarded(wrapped(d) if o.angle else d, self.gaps(o.value))
+        words = f"innovation: {o.name} observed - {o.name} of the forecast"
+        yield self.column(f"d_{o.name}", d, unit, words)
+        h = zeros(1, len(self.all))
+        for j, name in enumerate(self.names):
+            h[j] = yield from self.derivative(
+                f"H_{o.name}_{name}",
+                self.model.H[k, j],
+                x_f,
+                unit / self.units[j],
+                f"derivative of {o.name} with respect to {name}, at the forecast",
+            )
+        moved = [now - before for now, before in zip(self.x, x_f, strict=True)]
+        if all(h[j] == 0 or moved[j] == 0 for j in self.all):
+            return h, self.cell(f"d_{o.name}")
+        yield from self.left(o, h, moved)
+        return h, self.cell(f"d_{o.name}_left")
+
+    def left(self, o: Observation, h: Matrix, moved: Sequence[Expr]) -> Iterator[Definition]:
+        """What the observations before have left of d, and the variance of d itself."""
+        unit, d = parse_unit(o.unit), self.cell(f"d_{o.name}")
+        rest = d - sum(slope * move for slope, move in zip(h, moved, strict=True))
+        asked = (d,) if self.gaps(o.value) else ()
+        words = f"what the observations before have left of {d.base}"
+        yield self.column(f"d_{o.name}_left", self.guarded(rest, asked), unit, words)
+        Ph = yield from self.covariance_with(o, self.covariances("f"), h, "_f")
+        rule = self.guarded(expand((h * Ph)[0]) + o.variance, self.gaps(o.variance))
+        yield self.column(f"S_{o.name}_f", rule, unit**2, f"variance of {d.base} itself")
+
+    def covariance_with(
+        self, o: Observation, P: Matrix, h: Matrix, stage: str = ""
+    ) -> Generator[Definition, None, Matrix]:
+        """P h', in columns of its own where it has more than two terms."""
+        Ph = P * h.T
+        if sum(entry != 0 for entry in h) > 2:
+            for i, name in enumerate(self.names):
+                if Ph[i] != 0:
+                    words = f"covariance of {name} with the {o.name} that is expected"
+                    column = f"PH_{name}_{o.name}{stage}"
+                    unit = self.units[i] * parse_unit(o.unit)
+                    yield self.column(column, Ph[i], unit, words)
+                    Ph[i] = self.cell(column)
+        return Ph
+
+    def update(self, o: Observation, k: int, h: Matrix, d: Indexed) -> Iterator[Definition]:
+        """S = h P h' + r and K = P h' / S, then what they do to x and P."""
+        unit, touched = parse_unit(o.unit), self.touched(k)
+        Ph = yield from self.covariance_with(o, self.P, h)
+        S_o = self.cell(f"S_{o.name}")
+        asked = (d,) if self.gaps(o.value) else ()
+        asked = (d, S_o) if self.gaps(o.variance) else asked
+        self.weighed.append((d, S_o, asked))
+        variance = self.guarded(expand((h * Ph)[0]) + o.variance, self.gaps(o.variance))
+        yield self.column(f"S_{o.name}", variance, unit**2, f"variance of {d.base}")
+        K = {i: self.cell(f"K_{self.names[i]}_{o.name}") for i in touched}
+        for i in touched:
+            gain = self.guarded(Ph[i] / S_o, asked, S.Zero)
+            words = f"gain: {self.names[i]} for one unit of {d.base}"
+            yield self.column(f"K_{self.names[i]}_{o.name}", gain, self.units[i] / unit, words)
+        yield from self.moved_state(k, K, d, asked)
+        yield from self.moved_covariance(o, k, K)
+
+    def moved_state(
+        self, k: int, K: dict[int, Indexed], d: Indexed, asked: tuple[Indexed, ...]
+    ) -> Iterator[Definition]:
+        """The state: x <- x + K d."""
+        for i in K:
+            stage = self.stage(k, i)
+            rule = self.guarded(self.x[i] + K[i] * d, asked and (d,), self.x[i])
+            words = f"{_when(stage)}: {self.elements[i].description}"
+            start = self.cell(f"{self.names[i]}_f") if stage == "a" else Missing
+            yield self.column(f"{self.names[i]}_{stage}", rule, self.units[i], words, start)
+            self.x[i] = self.cell(f"{self.names[i]}_{stage}")
+
+    def moved_covariance(
+        self, o: Observation, k: int, K: dict[int, Indexed]
+    ) -> Iterator[Definition]:
+        """The covariance: P <- P - K S K', the upper triangle."""
+        S_o = self.cell(f"S_{o.name}")
+        for i, j in self.pairs():
+            if i in K and j in K:
+                stage = self.stage(k, i, j)
+                rule = self.P[i, j] - K[i] * K[j] * S_o
+                rule = self.guarded(rule, (S_o,) if self.gaps(o.variance) else (), self.P[i, j])
+                start = self.cell(self.P_name(i, j, "f")) if stage == "a" else Missing
+                yield self.covariance(i, j, stage, rule, start)
+                self.P[i, j] = self.P[j, i] = self.cell(self.P_name(i, j, stage))
+
+    def stage(self, k: int, *elements: int) -> str:
+        """Where observation k brings some elements: to the analysis, if it is the last for them."""
+        later = range(k + 1, len(self.model.observations))
+        return str(k + 1) if any(set(elements) <= set(self.touched(n)) for n in later) else "a"
+
+    def unobserved(self) -> Iterator[Definition]:
+        """The analysis of what no observation moves is the forecast."""
+        known = [set(self.touched(k)) for k in range(len(self.model.observations))]
+        for i, j in self.pairs():
+            if any({i, j} <= those for those in known):
+                continue
+            if i == j:
+                words = f"analysis: {self.elements[i].description}"
+                x_f = self.cell(f"{self.names[i]}_f")
+                yield self.column(f"{self.names[i]}_a", x_f, self.units[i], words, x_f)
+            forecast = self.cell(self.P_name(i, j, "f"))
+            yield self.covariance(i, j, "a", forecast, forecast)
+
+    def nis(self) -> Definition:
+        """The sum of d^2/S over the observations that are there."""
+        parts = [
+            self.guarded(d**2 / S_o, asked, S.Zero if len(self.weighed) > 1 else Missing)
+            for d, S_o, asked in self.weighed
+        ]
+        rule = Add(*parts)
+        seen = [And(*map(Observed, asked)) for _, _, asked in self.weighed]
+        if len(parts) > 1 and Or(*seen) != True:  # noqa: E712 - a SymPy condition
+            rule = Piecewise((rule, Or(*seen)), (Missing, True))
+        words = f"normalised innovation squared; expected: {len(parts)}"
+        return self.column("NIS", rule, parse_unit(""), words)
+
+    @staticmethod
+    def guarded(rule: Expr, cells: tuple[Indexed, ...], otherwise: Expr = Missing) -> Expr:
+        """A rule where some cells hold numbers; the rule itself if there are none to ask for."""
+        return when_observed(cells, rule, otherwise) if cells else rule
+
+
+def _related(model: StateSpace) -> set[tuple[int, int]]:
+    """Pairs of elements whose covariance does not stay 0 for ever."""
+    every = list(itertools.product(range(len(model.state)), repeat=2))
+    nonzero_F = {(i, j) for i, j in every if model.F[i, j] != 0}
+    nonzero_H = [{j for _, j in every if model.H[k, j] != 0} for k in range(model.H.rows)]
+    found = {(i, i) for i, _ in every} | {(i, j) for i, j in every if model.Q[i, j] != 0}
+    while True:
+        # F P F' relates i and j if they come from k and l that are related.
+        new = {(i, j) for i, k in nonzero_F for j, m in nonzero_F if (k, m) in found}
+        for seen in nonzero_H:
+            moved = {i for i, j in found if j in seen}
+            new |= set(itertools.product(moved, repeat=2))
+        if new <= found:
+            return found
+        found |= new
+
+
+def _terms(expression: Expr) -> int:
+    return len(Add.make_args(expression))
+
+
+def _when(stage: str) -> str:
+    words = {"f": "forecast", "a": "analysis", "1": "after the first observation"}
+    return words.get(stage, f"after {stage} observations")
