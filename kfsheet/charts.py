@@ -34,6 +34,7 @@ LOOKS = {
     "line": Look("0072B2", width=1.25),
     "second line": Look("D55E00", width=1.25),
     "cloud": Look("E69F00", line="", marker="circle", size=2),  # hundreds of observations
+    "bound": Look("222222", line="dash", width=1.25),
     "band": Look("0072B2", line="dash", width=1.0),
     "second band": Look("D55E00", line="dash", width=1.0),
 }
@@ -59,6 +60,8 @@ class Chart:
     series: tuple[Series, ...]
     note: str = ""
     origin_top_left: bool = False
+    y_limits: tuple[float, float] | None = None
+    """Lowest and highest y, where a few large values would hide the rest."""
 
     def check(self, model: Recurrence) -> None:
         """Refuse a chart of columns or roles that do not exist."""

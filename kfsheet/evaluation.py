@@ -1,37 +1,71 @@
-"""A recurrence as numbers: compile the generated source, run it, return a DataFrame."""
+"""A recurrence as numbers: run its generated source, return a DataFrame.
+
+A model that is run once or twice runs as Python. One that is run often is compiled (with Numba,
+where it is installed), and the machine code is kept on disk; see :mod:`kfsheet.kernel`. Both
+compute the same to rounding, and a computation that has no value is explained by Python's run.
+"""
 
 from __future__ import annotations
 
 import linecache
 import traceback
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import lru_cache
+from importlib.util import find_spec
 from math import isinf, nan
 from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
 
 from kfsheet.errors import DataError
+from kfsheet.kernel import Kernel, compiled_function, is_ready, kernel_of
 from kfsheet.parts import checked_values
 from kfsheet.pythoncode import python_source
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     import pandas as pd
 
+    from kfsheet.members import NEES, Draws, Study
     from kfsheet.recurrence import Recurrence
+
+WORTH_LOADING, WORTH_COMPILING = 500_000, 3_000_000  # cells computed by Python before
 
 
 def evaluate(
-    model: Recurrence, /, data: Mapping[str, Sequence[float]] | None = None, **parameters: float
-) -> pd.DataFrame:
-    """Run a recurrence once.
+    model: Recurrence,
+    /,
+    data: Mapping[str, Sequence[float]] | Draws | None = None,
+    *,
+    columns: Sequence[str] | None = None,
+    members: int | None = None,
+    quantiles: Sequence[float] = (),
+    nees: Mapping[str, NEES] | None = None,
+    executor: Executor | None = None,
+    **parameters: Any,
+) -> pd.DataFrame | Study:
+    """Run a recurrence once, or for many members.
 
     Parameters
     ----------
     model : Recurrence
         What to run.
     data : mapping, optional
-        Other values of data columns, by name; NaN or None means "not observed".
+        Other values of data columns, by name; NaN or None means "not observed". With ``members``,
+        an array of shape (members, rows) gives each member its own, and :class:`Draws` draws them.
+    columns : sequence of str, optional
+        The columns that are wanted; all by default. A few are quick: nothing is computed that
+        they do not need, and ``scalars`` holds the derived ones only.
+        With ``members``, those of which statistics are wanted; none by default.
+    members : int, optional
+        How many runs; the result is then a :class:`~kfsheet.members.Study`.
+    quantiles, nees, executor
+        With ``members``; see :func:`kfsheet.members.study`.
     **parameters : float
-        Other values of parameters, by name.
+        Other values of parameters, by name; with ``members``, also arrays of that length.
 
     Returns
     -------
@@ -42,21 +76,163 @@ def evaluate(
     Raises
     ------
     DataError
-        If a name is unknown, a value is not allowed, or a formula has no value in some row
-        (a division by zero, the root of a negative number).
+        For an unknown name, a value that is not allowed, a column of the wrong length, or a
+        computation without a value; the message names the formula and the row.
 
     Examples
     --------
     >>> from kfsheet.exercises.football import football
-    >>> float(evaluate(football)["x_f"].iloc[0])
-    23.4
+    >>> evaluate(football, h=0, p=2)["z_a"].round(2).head(3).tolist()
+    [0.11, 1.11, 2.0]
     """
-    import pandas as pd
+    if members is not None:
+        from kfsheet.members import study
 
-    columns, scalars, values = run(model, data, parameters)
-    frame = pd.DataFrame(columns, index=pd.RangeIndex(model.rows, name=model.step), dtype=float)
-    frame.attrs = {"units": model.units(), "parameters": values, "scalars": scalars}
-    return frame
+        return study(
+            model, members, data, columns or (), quantiles, nees or {}, executor, parameters
+        )
+    if quantiles or nees or executor:
+        raise DataError("quantiles, nees and executor belong to many members; give members=")
+    return _one_run(model, data or {}, columns, parameters)
+
+
+def _one_run(
+    model: Recurrence,
+    data: Mapping[str, Sequence[float]],
+    columns: Sequence[str] | None,
+    parameters: Mapping[str, float],
+) -> pd.DataFrame:
+    facts = facts_of(model)
+    wanted = facts.wanted(model, columns)
+    values = checked_parameters(model, parameters)
+    series = facts.arrays(model, data)
+    kernel = facts.kernel(model, wanted)
+    found = kernel and _run_compiled(kernel, series, values, facts)
+    out, scalars = found or _run_python(model, data, parameters, wanted)
+    if columns is not None:
+        scalars = {name: scalars[name] for name in model.derived_scalars}
+    return facts.frame(model, wanted, out, values, scalars)
+
+
+def _run_compiled(
+    kernel: Kernel, series: Mapping[str, np.ndarray], values: Mapping[str, float], facts: Facts
+) -> tuple[np.ndarray, dict[str, float]] | None:
+    """Columns and scalars by the compiled kernel; None where something has no value."""
+    function = compiled_function(kernel.source)
+    out = np.empty((1, len(kernel.columns), facts.rows))
+    results = np.empty((1, len(kernel.scalars)))
+    numbers = np.array([[values[name] for name in kernel.parameters]])
+    try:
+        function(0, 1, numbers, *(series[name] for name in kernel.data), out, results)
+    except (ArithmeticError, ValueError):
+        return None
+    if np.isinf(out).any():
+        return None
+    found = results[0].tolist()
+    scalars = {n: nan if isinf(v) else v for n, v in zip(kernel.scalars, found, strict=True)}
+    return out[0], scalars
+
+
+def _run_python(
+    model: Recurrence,
+    data: Mapping[str, Sequence[float]],
+    parameters: Mapping[str, float],
+    wanted: tuple[str, ...],
+) -> tuple[np.ndarray, dict[str, float]]:
+    found, scalars, _ = run(model, data, parameters)
+    return np.array([found[name] for name in wanted], dtype=float), scalars
+
+
+@dataclass
+class Facts:
+    """What every run of one version of a model needs, found once."""
+
+    rows: int
+    default: dict[str, np.ndarray]
+    units: dict[str, str]
+    every: tuple[str, ...]
+    python_cells: int = 0
+    frames: dict[tuple[str, ...], Any] = field(default_factory=dict)
+
+    def wanted(self, model: Recurrence, columns: Sequence[str] | None) -> tuple[str, ...]:
+        """Names of the columns to return, checked."""
+        if columns is None:
+            return self.every
+        for name in columns:
+            if name not in self.every:
+                model.column(name)  # raises an error that names those that there are
+        return tuple(columns)
+
+    def arrays(self, model: Recurrence, given: Mapping[str, Any]) -> dict[str, np.ndarray]:
+        """Data columns as arrays of shape (1, rows)."""
+        series = dict(self.default)
+        for name, values in given.items():
+            check_data_name(name, series, model)
+            series[name] = checked_array(model, name, values)[None, :]
+        return series
+
+    def kernel(self, model: Recurrence, wanted: tuple[str, ...]) -> Kernel | None:
+        """The compiled kernel, if the model is run so often that it is worth it."""
+        self.python_cells += self.rows * len(self.every)
+        if self.python_cells < WORTH_LOADING or not can_compile():
+            return None
+        scalars = None if wanted == self.every else tuple(model.derived_scalars)
+        kernel = kernel_of(model, model.version, wanted, scalars)
+        worth = self.python_cells >= WORTH_COMPILING or is_ready(kernel)
+        return kernel if worth else None
+
+    def frame(
+        self,
+        model: Recurrence,
+        wanted: tuple[str, ...],
+        out: np.ndarray,
+        values: dict[str, float],
+        scalars: dict[str, float],
+    ) -> pd.DataFrame:
+        """Numbers as a DataFrame, names and units with them."""
+        import pandas as pd
+
+        if wanted not in self.frames:
+            self.frames[wanted] = pd.Index(wanted), pd.RangeIndex(self.rows, name=model.step)
+        columns, index = self.frames[wanted]
+        frame = pd.DataFrame(out[: len(wanted)].T, index=index, columns=columns, copy=False)
+        frame.attrs = {"units": self.units, "parameters": values, "scalars": scalars}
+        return frame
+
+
+_FACTS: WeakKeyDictionary[Recurrence, tuple[int, Facts]] = WeakKeyDictionary()
+
+
+def facts_of(model: Recurrence) -> Facts:
+    """What every run of a model needs; found anew when something was added to it."""
+    version, facts = _FACTS.get(model, (None, None))
+    if version != model.version:
+        model.validate()
+        default = {c.name: np.array([c.values]) for c in model.all_columns() if c.is_data}
+        every = tuple(c.name for c in model.all_columns())
+        facts = Facts(model.rows, default, model.units(), every)
+        _FACTS[model] = (model.version, facts)
+    return facts
+
+
+def can_compile() -> bool:
+    """Whether Numba is installed."""
+    return find_spec("numba") is not None
+
+
+def warm_up(model: Recurrence, columns: Sequence[str] | None = None) -> None:
+    """Compile a model now, rather than after some runs; does nothing without Numba.
+
+    Parameters
+    ----------
+    model : Recurrence
+        What will be run often.
+    columns : sequence of str, optional
+        The columns that will be wanted, as in :func:`evaluate`.
+    """
+    facts = facts_of(model)
+    facts.python_cells = WORTH_COMPILING
+    evaluate(model, columns=columns)
 
 
 def run(
@@ -64,10 +240,10 @@ def run(
     data: Mapping[str, Sequence[float]] | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> tuple[dict[str, list[float]], dict[str, float], dict[str, float]]:
-    """Columns, scalars and parameter values of one run, without pandas; see :func:`evaluate`."""
+    """Columns, scalars and parameter values of one run by Python; see :func:`evaluate`."""
     values = checked_parameters(model, parameters or {})
     series = _checked_data(model, data or {})
-    function = _compiled(model, model.version)
+    function = _python_function(model, model.version)
     try:
         columns, scalars = function(**series, **values)
     except (ArithmeticError, ValueError, TypeError) as error:
@@ -82,27 +258,50 @@ def run(
 
 def checked_parameters(model: Recurrence, given: Mapping[str, Any]) -> dict[str, float]:
     """Value of every parameter, those in ``given`` checked and put in."""
-    if unknown := sorted(set(given) - set(model.parameters)):
-        known = ", ".join(model.parameters)
-        raise DataError(f"{model.name} has no parameter {unknown[0]}; it has {known}")
-    return {name: p.checked(given.get(name, p.value)) for name, p in model.parameters.items()}
+    values = model.defaults()
+    for name, value in given.items():
+        if name not in values:
+            known = ", ".join(values)
+            raise DataError(f"{model.name} has no parameter {name}; it has {known}")
+        values[name] = model.parameters[name].checked(value)
+    return values
+
+
+def check_data_name(name: str, known: Mapping[str, Any], model: Recurrence) -> None:
+    """Refuse a data column that the model does not have."""
+    if name not in known:
+        raise DataError(f"{model.name} has no data column {name}; it has {', '.join(known)}")
+
+
+def checked_array(model: Recurrence, name: str, values: Any) -> np.ndarray:
+    """Values of a data column as an array, quickly if they are plain numbers."""
+    optional = model.table[name].may_be_missing
+    array = values if isinstance(values, np.ndarray) else np.asarray(values)
+    if array.ndim == 1 and array.dtype.kind in "fiu":
+        array = array.astype(float)
+        fine = np.isfinite(array) | (np.isnan(array) if optional else False)
+        if fine.all() and len(array) == model.rows:
+            return array
+    return np.array(_checked_column(model, name, values))
 
 
 def _checked_data(model: Recurrence, given: Mapping[str, Any]) -> dict[str, list[float]]:
     series = {c.name: list(c.values) for c in model.all_columns() if c.is_data}
-    if unknown := sorted(set(given) - set(series)):
-        raise DataError(f"{model.name} has no data column {unknown[0]}; it has {', '.join(series)}")
     for name, values in given.items():
-        series[name] = list(checked_values(name, values, model.table[name].may_be_missing))
-        if len(series[name]) != model.rows:
-            raise DataError(
-                f"{name} has {len(series[name])} values; the table has {model.rows} rows"
-            )
+        check_data_name(name, series, model)
+        series[name] = _checked_column(model, name, values)
     return series
 
 
+def _checked_column(model: Recurrence, name: str, values: Any) -> list[float]:
+    column = list(checked_values(name, values, model.table[name].may_be_missing))
+    if len(column) != model.rows:
+        raise DataError(f"{name} has {len(column)} values; the table has {model.rows} rows")
+    return column
+
+
 @lru_cache(maxsize=32)
-def _compiled(model: Recurrence, version: int) -> Callable:
+def _python_function(model: Recurrence, version: int) -> Callable:
     """The generated function of one version of a model."""
     source = python_source(model)
     filename = f"<kfsheet {model.name} {id(model)} {version}>"

@@ -50,6 +50,8 @@ def draw(chart: Chart, frame: pd.DataFrame, ax: Axes | None = None) -> Axes:
             linewidth=look.width,
             label=series.label or "_",
         )
+    if chart.y_limits:
+        ax.set_ylim(*chart.y_limits)
     if chart.origin_top_left:
         ax.set_ylim(ax.get_ylim()[1], 0)
         ax.set_xlim(left=0)

@@ -70,8 +70,12 @@ class PythonPrinter(FormulaPrinter):
         *branches, (last, condition) = expr.args
         if condition != True:  # noqa: E712 - a SymPy condition, not a Python one
             raise PrintError(f"Piecewise without an otherwise branch: {expr}")
-        pieces = [f"{self._print(value)} if {self._print(test)} else " for value, test in branches]
-        return f"({''.join(pieces)}{self._print(last)})"
+        pieces = [f"{self.value(value)} if {self._print(test)} else " for value, test in branches]
+        return f"({''.join(pieces)}{self.value(last)})"
+
+    def value(self, expr: Expr) -> str:
+        """A whole value of a cell: 0.0, not 0, lest a recurrence computes in long integers."""
+        return f"{expr}.0" if expr.is_Integer else self._print(expr)
 
     def _print_ITE(self, expr: Basic) -> str:
         test, yes, no = (self._print(a) for a in expr.args)
@@ -100,6 +104,11 @@ def python_code(expression: Expr) -> str:
     """
     text = PythonPrinter().doprint(expression)
     return text[1:-1] if isinstance(expression, Piecewise) else text
+
+
+def python_value(expression: Expr) -> str:
+    """Python source of the value of a cell: as :func:`python_code`, but a whole number is 0.0."""
+    return f"{expression}.0" if expression.is_Integer else python_code(expression)
 
 
 def python_source(model: Recurrence) -> str:
@@ -158,7 +167,7 @@ def _row_lines(model: Recurrence, step: Pass) -> list[str]:
     lines = []
     for row in range(alone):
         lines += ["", f"    t = {row}"]
-        lines += [f"    {c.name}[t] = {python_code(c.definition(row))}" for c in step.rows[row]]
+        lines += [f"    {c.name}[t] = {python_value(c.definition(row))}" for c in step.rows[row]]
     lines += ["", f"    for t in range({f'{alone}, ' if alone else ''}rows):"]
     return lines + [line for c in general for line in _loop_lines(c, alone)]
 
@@ -168,9 +177,9 @@ def _loop_lines(column: Column, first: int) -> list[str]:
     lines, word = [], "if"
     for row in range(first, len(column.start)):
         lines.append(f"        {word} t == {row}:")
-        lines.append(f"            {column.name}[t] = {python_code(column.start[row])}")
+        lines.append(f"            {column.name}[t] = {python_value(column.start[row])}")
         word = "elif"
-    general = f"{column.name}[t] = {python_code(column.expression)}"
+    general = f"{column.name}[t] = {python_value(column.expression)}"
     return [*lines, "        else:", f"    {' ' * 8}{general}"] if lines else [f"        {general}"]
 
 

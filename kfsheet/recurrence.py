@@ -66,6 +66,8 @@ class Recurrence:
         self.table: dict[str, Column] = {}
         self.clock: Column | None = None
         self._readers: dict[str, set[str]] = {}  # who reads a column
+        self.version = 0
+        """How often something was added; so a run can tell whether what it knows is current."""
 
     def __repr__(self) -> str:
         return (
@@ -104,6 +106,7 @@ class Recurrence:
         symbol = Symbol(name, real=True, **({sign: True} if sign else {}))
         new = Parameter(symbol, value, unit, description, sign)
         self.parameters[name] = replace(new, value=new.checked(value))
+        self.version += 1
         return symbol
 
     def derived(self, name: str, expression: Expr, unit: str, description: str) -> Symbol:
@@ -152,6 +155,7 @@ class Recurrence:
         if not numbers:
             raise DataError(f"column {name} has no values; a table needs at least one row")
         (base,) = self.columns(name, section=section)
+        self.version += 1
         self._rows = len(numbers)
         self.table[name] = replace(
             self.table[name],
@@ -223,6 +227,7 @@ class Recurrence:
             raise ModelError("the clock reads a column; give it as a formula of t and parameters")
         parse_unit(unit)
         self.clock = Column(ColumnBase("time", real=True), "", unit, description, expression)
+        self.version += 1
         return self.clock.base
 
     # -- asking it -------------------------------------------------------------------------
@@ -250,12 +255,6 @@ class Recurrence:
         for column in self.table.values():
             result.setdefault(column.section, []).append(column)
         return result
-
-    @property
-    def version(self) -> int:
-        """How many things are defined; it only grows, so it tells whether anything was added."""
-        defined = sum(bool(c.rules) or c.is_data for c in self.all_columns())
-        return len(self._scalars()) + defined
 
     @property
     def start_rows(self) -> int:
@@ -341,6 +340,7 @@ class Recurrence:
         parse_unit(unit)
         symbol = Symbol(name, real=True)
         home[name] = Scalar(symbol, expression, unit, description)
+        self.version += 1
         return symbol
 
     def _check_scalar_name(self, name: str) -> None:
@@ -415,3 +415,4 @@ class Recurrence:
             raise
         for name in reads:
             self._readers.setdefault(name, set()).add(new.name)
+        self.version += 1

@@ -1,6 +1,8 @@
 """Fixtures that several test files share."""
 
 import os
+import tempfile
+from pathlib import Path
 
 import matplotlib
 import pytest
@@ -11,6 +13,9 @@ from kfsheet.excel.workbook import write_workbook
 from kfsheet.exercises.football import exercise
 
 matplotlib.use("Agg")
+# Compiled models of one test run, shared by its workers and forgotten with the temporary files.
+RUN = os.environ.get("PYTEST_XDIST_TESTRUNUID") or str(os.getpid())
+os.environ["KFSHEET_CACHE"] = str(Path(tempfile.gettempdir()) / f"kfsheet-tests-{RUN}")
 # The same draws on every machine, and no clock: a slow machine is not a wrong result.
 settings.register_profile("kfsheet", deadline=None, derandomize=True)
 settings.load_profile("kfsheet")

@@ -67,7 +67,7 @@ def test_one_bad_file_does_not_keep_the_others_from_being_checked(run, football_
     [
         ((), "required: COMMAND"),
         (("bake",), "invalid choice: 'bake'"),
-        (("build", "rugby"), "unknown exercise 'rugby'; there is football"),
+        (("build", "rugby"), "unknown exercise 'rugby'; there is cannonball"),
         (("build", "rugby.py"), "rugby.py does not exist"),
         (("build", "--out", "/dev/null/x"), "cannot be written"),
         (("check",), "WORKBOOK"),

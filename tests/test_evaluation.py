@@ -100,3 +100,13 @@ def test_start_rows_of_different_depth_run_in_an_order_that_works_for_each():
     m.define(q[t], p[t - 1] + 1, "", "needs p of the row before", start=[p[t]])
     assert evaluate(m)["p"].tolist() == [7, 7, 9, 11, 13]
     assert evaluate(m)["q"].tolist() == [7, 8, 8, 10, 12]
+
+
+def test_whole_numbers_do_not_grow_without_end():
+    """Python's integers have no bounds; a recurrence that starts with 1 computes in floats."""
+    m = Recurrence("grows", title="Grows", rows=40)
+    (v, w) = m.columns("v", "w", section="S")
+    m.define(v[t], (v[t - 1] + 12) ** 12, "", "v", start=[1])
+    m.define(w[t], v[t], "", "w")
+    with pytest.raises(DataError, match=r"v in row .* beyond 1e308"):
+        evaluate(m)

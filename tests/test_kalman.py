@@ -2,6 +2,7 @@
 
 import math
 from fractions import Fraction
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -274,12 +275,14 @@ def test_a_small_case_in_exact_rationals():
     a = m.data("a", [0, 1, 2], "", "observed", section="Data")
     b = m.data("b", [0, 3, 1], "", "observed", section="Data")
     x, v = symbols("x v", real=True)
-    state = {x: State("", "position", 1, 2), v: State("", "velocity", 0, 3)}
+    starts = (m.parameter(name, 1, "", name) for name in ("x_0", "s_x", "v_0", "s_v"))
+    state = {x: State("", "position", *islice(starts, 2)), v: State("", "velocity", *starts)}
     seen = [Observation("a", a[t], x + v, r_1, ""), Observation("b", b[t], x - 2 * v, r_2, "")]
     add_filter(m, StateSpace(state, [x + v, v], diag(0, q), seen), section="Filter")
     namespace = {}
-    exec(python_source(m), namespace)
+    exec(python_source(m).replace("= 0.0", "= 0"), namespace)
     numbers = {"q": Fraction(1, 3), "r_1": Fraction(2, 7), "r_2": Fraction(5, 11)}
+    numbers |= {"x_0": Fraction(1), "s_x": Fraction(2), "v_0": Fraction(0), "s_v": Fraction(3)}
     columns, _ = namespace["exact"](
         a=list(map(Fraction, (0, 1, 2))), b=list(map(Fraction, (0, 3, 1))), **numbers
     )

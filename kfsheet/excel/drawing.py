@@ -56,6 +56,8 @@ def _native(book: Workbook, exercise: Exercise, layout: Layout, chart: Chart) ->
         axis.title, axis.delete, axis.number_format = _title(label, 9), False, "General"
         axis.majorGridlines.spPr = _line(Look("D9D9D9", width=0.75))
         axis.tickLblPos = "low"
+    if chart.y_limits:
+        native.y_axis.scaling.min, native.y_axis.scaling.max = chart.y_limits
     if chart.origin_top_left:
         native.y_axis.scaling.orientation = "maxMin"
         native.x_axis.tickLblPos = "nextTo"

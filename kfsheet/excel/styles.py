@@ -81,13 +81,14 @@ class Styles:
 
 
 def number_format(values: list[float]) -> str:
-    """About four figures at the column's root mean square, or scientific where that is tiny."""
+    """Four figures at the column's root mean square, or more; scientific where that is tiny."""
     numbers = [v for v in values if isinstance(v, int | float) and isfinite(v)]
     size = sqrt(sum(v * v for v in numbers) / len(numbers)) if numbers else 0
     if size == 0:
         return "0.000"
+    if size < 1e6 and all(v == round(v) for v in numbers):
+        return "General"  # counts and switches; a fraction would still show
     magnitude = floor(log10(size))
     if not -4 <= magnitude <= 6:
         return "0.000E+00"
-    decimals = max(0, 3 - magnitude)
-    return "0." + "0" * decimals if decimals else "0"
+    return "0." + "0" * max(1, 3 - magnitude)

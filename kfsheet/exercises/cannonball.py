@@ -222,14 +222,21 @@ SECTIONS = {
 }
 
 
-def _residuals(title: str, label: str, name: str, raw: str = "", note: str = "") -> Chart:
+def _residuals(
+    title: str,
+    label: str,
+    name: str,
+    raw: str = "",
+    note: str = "",
+    limits: tuple[float, float] | None = None,
+) -> Chart:
     band = (
-        Series("time", f"{name}_low", "", "band"),
-        Series("time", f"{name}_high", "2 sigma band", "band"),
+        Series("time", f"{name}_low", "", "bound"),
+        Series("time", f"{name}_high", "2 sigma band", "bound"),
     )
     cloud = (Series("time", raw, "radar alone", "cloud"),) if raw else ()
-    line = Series("time", name, "EKF" if raw else f"innovation {name}", "line")
-    return Chart(title, "time (s)", label, (*cloud, line, *band), note=note)
+    line = Series("time", name, "EKF" if name.startswith("e") else f"innovation {name}", "line")
+    return Chart(title, "time (s)", label, (*cloud, line, *band), note=note, y_limits=limits)
 
 
 CHARTS = (
@@ -245,13 +252,25 @@ CHARTS = (
         note="Radar positions scatter by up to 600 m; the filter lies on the path.",
     ),
     _residuals(
-        "Range", "observed - forecast (m)", "d_r", note="Innovations of r: 19 of 20 inside."
+        "Range",
+        "observed - forecast (m)",
+        "d_r",
+        note="Innovations of r: 19 of 20 within the band. The first ones are outside the picture.",
+        limits=(-150, 150),
     ),
     _residuals("Angle", "observed - forecast (rad)", "d_theta", note="Innovations of theta."),
     _residuals(
-        "Distance", "error of x (m)", "e_x_a", "e_x_obs", "The band is what the EKF claims."
+        "Distance", "error of x (m)", "e_x_a", "e_x_obs", "Errors: radar alone, and the EKF's."
     ),
     _residuals("Height", "error of y (m)", "e_y_a", "e_y_obs", "The same for the height."),
+    _residuals(
+        "Distance, close up",
+        "error of x (m)",
+        "e_x_a",
+        note="The band is what the EKF claims.",
+        limits=(-60, 60),
+    ),
+    _residuals("Height, close up", "error of y (m)", "e_y_a", note="The same.", limits=(-100, 100)),
     Chart(
         "Extended or linear?",
         "time (s)",
@@ -261,6 +280,7 @@ CHARTS = (
             Series("time", "e_y_a", "EKF", "line"),
         ),
         note="The same radar, two filters.",
+        y_limits=(-200, 200),
     ),
 )
 QUESTIONS = (

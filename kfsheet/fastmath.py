@@ -1,0 +1,146 @@
+"""What compiled kernels need: math that refuses what Python's refuses, and aggregates.
+
+Numba's own sqrt(-1) is NaN, which would pass for a missing value; Python raises an error. So do
+these. Aggregates add with Neumaier's compensation, which agrees with math.fsum to about one unit
+in the last place; as everywhere, missing values (NaN) are left out.
+"""
+
+import math
+from math import isnan, nan
+
+import numba
+
+compiled = numba.njit(cache=True, nogil=True, error_model="python")
+"""How everything is compiled: without the interpreter's lock, and dividing as Python does."""
+
+DOMAIN = "math domain error"
+
+
+@compiled
+def sqrt(x):
+    if x < 0:
+        raise ValueError(DOMAIN)
+    return math.sqrt(x)
+
+
+@compiled
+def log(x):
+    if x <= 0:
+        raise ValueError(DOMAIN)
+    return math.log(x)
+
+
+@compiled
+def asin(x):
+    if abs(x) > 1:
+        raise ValueError(DOMAIN)
+    return math.asin(x)
+
+
+@compiled
+def acos(x):
+    if abs(x) > 1:
+        raise ValueError(DOMAIN)
+    return math.acos(x)
+
+
+@compiled
+def acosh(x):
+    if x < 1:
+        raise ValueError(DOMAIN)
+    return math.acosh(x)
+
+
+@compiled
+def atanh(x):
+    if abs(x) >= 1:
+        raise ValueError(DOMAIN)
+    return math.atanh(x)
+
+
+@compiled
+def power(x, y):
+    if (x < 0 and y != math.floor(y)) or (x == 0 and y < 0):
+        raise ValueError(DOMAIN)
+    return float(x) ** y
+
+
+@compiled
+def observed(x):
+    return not isnan(x)
+
+
+@compiled
+def sign(x):
+    return (x > 0) - (x < 0)
+
+
+@compiled
+def count(column):
+    number = 0
+    for x in column:
+        number += not isnan(x)
+    return number
+
+
+@compiled
+def total(column):
+    whole, rest = 0.0, 0.0
+    for x in column:
+        if isnan(x):
+            continue
+        new = whole + x
+        rest += (whole - new) + x if abs(whole) >= abs(x) else (x - new) + whole
+        whole = new
+    return whole + rest
+
+
+@compiled
+def mean(column):
+    number = count(column)
+    return total(column) / number if number else nan
+
+
+@compiled
+def rms(column):
+    return math.sqrt(mean(column * column))
+
+
+@compiled
+def std(column):
+    number = count(column)
+    squares = (column - mean(column)) ** 2
+    return math.sqrt(total(squares) / (number - 1)) if number > 1 else nan
+
+
+@compiled
+def largest(column):
+    found = nan
+    for x in column:
+        if not isnan(x) and not x <= found:
+            found = x
+    return found
+
+
+@compiled
+def smallest(column):
+    found = nan
+    for x in column:
+        if not isnan(x) and not x >= found:
+            found = x
+    return found
+
+
+@compiled
+def last(column):
+    return column[-1]
+
+
+@compiled
+def sumproduct(first, second):
+    return total(first * second)
+
+
+CHECKED = "sqrt log asin acos acosh atanh power".split()
+AGGREGATES = "count total mean rms std largest smallest last sumproduct".split()
+NAMES = [*CHECKED, "observed", "sign", *AGGREGATES]

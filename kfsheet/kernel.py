@@ -1,0 +1,286 @@
+"""A recurrence as source for a compiler: the loop of :mod:`kfsheet.pythoncode`, in scalars.
+
+Only the columns that somebody wants are stored; all others are local variables, which a compiler
+keeps in registers. Numba compiles the source once and keeps the machine code in a cache on disk,
+under a name that is a digest of the source, so that the next process starts at once.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import inspect
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from platformdirs import user_cache_dir
+from sympy import Expr, Indexed
+
+from kfsheet.checks import columns_read
+from kfsheet.expressions import column_references, lag
+from kfsheet.files import write_file
+from kfsheet.pythoncode import PythonPrinter
+from kfsheet.schedule import Pass
+
+if TYPE_CHECKING:
+    from kfsheet.parts import Column
+    from kfsheet.recurrence import Recurrence
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """Source of a function ``kernel(first, last, parameters, *data, out, results)``.
+
+    ``columns`` and ``scalars`` name what it stores, in order; ``parameters`` and ``data`` what it
+    takes, in order.
+    """
+
+    source: str
+    parameters: tuple[str, ...]
+    data: tuple[str, ...]
+    columns: tuple[str, ...]
+    scalars: tuple[str, ...]
+
+
+@lru_cache(maxsize=64)
+def kernel_of(
+    model: Recurrence,
+    version: int,
+    columns: tuple[str, ...] | None = None,
+    scalars: tuple[str, ...] | None = None,
+) -> Kernel:
+    """The kernel of one version of a model that computes what is named, or everything."""
+    every = {**model.derived_scalars, **model.summaries}
+    scalars = tuple(every) if scalars is None else scalars
+    columns = tuple(c.name for c in model.all_columns()) if columns is None else columns
+    return _Source(model, columns, scalars).kernel()
+
+
+class _Printer(PythonPrinter):
+    """A cell of this row is a local variable, one of a row before is another."""
+
+    def __init__(self, source: _Source) -> None:
+        super().__init__()
+        self._source = source
+
+    def _print_Indexed(self, expr: Indexed) -> str:
+        return self._source.cell(str(expr.base.label), int(lag(expr)))
+
+    def _print_IndexedBase(self, expr: Expr) -> str:
+        return self._source.whole(str(expr.label))
+
+    def _print_Pow(self, expr: Expr) -> str:
+        whole = expr.exp.is_Integer or (-2 * expr.exp).is_Integer
+        return super()._print_Pow(expr) if whole else self._call("power", expr.base, expr.exp)
+
+
+class _Source:
+    """Writes the kernel of a model, leaving out what nothing wanted needs."""
+
+    def __init__(
+        self, model: Recurrence, columns: tuple[str, ...], scalars: tuple[str, ...]
+    ) -> None:
+        self.model, self.columns, self.scalars = model, columns, scalars
+        self.passes = model.passes()
+        self.level = {c.name: n for n, p in enumerate(self.passes) for c in p.rows[-1]}
+        self.needed = self._needed()
+        self.stored = self._stored()
+        self.now = 0
+        self._code = _Printer(self).doprint
+
+    def kernel(self) -> Kernel:
+        parameters = tuple(self.model.parameters)
+        columns = self.model.table.values()
+        data = tuple(c.name for c in columns if c.is_data and c.name in self.needed)
+        lines = [*self._head(data), *self._body(), *self._tail()]
+        source = "\n".join([PRELUDE, *lines, ""])
+        return Kernel(source, parameters, data, tuple(self.stored), self.scalars)
+
+    def cell(self, name: str, back: int) -> str:
+        """A column in this row or in one before."""
+        column = self.model.column(name)
+        row = f"t - {back}" if back else "t"
+        if column.is_data:
+            return f"{name}[{row}]"
+        if self.level[name] < self.now:
+            return f"kfsheet_out[{self.stored[name]}, {row}]"
+        return f"kfsheet_{back}_{name}" if back else name
+
+    def whole(self, name: str) -> str:
+        """A column as an array, for an aggregate."""
+        return name if self.model.column(name).is_data else f"kfsheet_out[{self.stored[name]}]"
+
+    # -- what is needed ----------------------------------------------------------------------
+
+    def _reads(self, name: str) -> set[str]:
+        every = {**self.model.derived_scalars, **self.model.summaries}
+        item = every.get(name) or self.model.column(name)
+        symbols = {s.name for rule in item.rules for s in rule.free_symbols}
+        columns = {n for rule in item.rules for n in columns_read(rule)}
+        return columns | (symbols & set(every))
+
+    def _needed(self) -> set[str]:
+        found, todo = set(), [*self.columns, *self.scalars]
+        while todo:
+            name = todo.pop()
+            if name not in found:
+                found.add(name)
+                todo += self._reads(name)
+        return found
+
+    def _stored(self) -> dict[str, int]:
+        """Row of ``out`` for every column that is wanted, aggregated or read by a later pass."""
+        formulas = [c for c in self.model.all_columns() if not c.is_data and c.name in self.needed]
+        kept = {name for name in self.columns if name in self.level}
+        for summary in self.model.summaries.values():
+            if summary.name in self.needed:
+                kept |= columns_read(summary.expression)
+        for column in formulas:
+            later = {n for rule in column.rules for n in columns_read(rule)}
+            kept |= {n for n in later if self.level.get(n, 99) < self.level[column.name]}
+        extra = [c.name for c in formulas if c.name in kept and c.name not in self.columns]
+        return {name: n for n, name in enumerate([*self.columns, *extra])}
+
+    # -- lines -------------------------------------------------------------------------------
+
+    def _head(self, data: tuple[str, ...]) -> list[str]:
+        # Everything of ours begins with kfsheet_, which no name of a model does.
+        names = "".join(f"kfsheet_all_{name}, " for name in data)
+        lines = [
+            "def kernel(kfsheet_first, kfsheet_last, kfsheet_ps, "
+            f"{names}kfsheet_outs, kfsheet_rs):",
+            "    rows = kfsheet_outs.shape[2]",
+            "    for kfsheet_k in range(kfsheet_first, kfsheet_last):",
+            "        kfsheet_out = kfsheet_outs[kfsheet_k - kfsheet_first]",
+            "        kfsheet_p = kfsheet_ps[min(kfsheet_k, kfsheet_ps.shape[0] - 1)]",
+        ]
+        lines += [f"        {n} = kfsheet_p[{k}]" for k, n in enumerate(self.model.parameters)]
+        for name in data:
+            every = f"kfsheet_all_{name}"
+            lines.append(f"        {name} = {every}[min(kfsheet_k, {every}.shape[0] - 1)]")
+            if name in self.stored:
+                lines.append(f"        kfsheet_out[{self.stored[name]}] = {name}")
+        derived = self.model.derived_scalars.values()
+        return lines + self._scalar_lines(s for s in derived if s.name in self.needed)
+
+    def _scalar_lines(self, scalars: Iterator) -> list[str]:
+        return [f"        {s.name} = {self._code(s.expression)}" for s in scalars]
+
+    def _body(self) -> Iterator[str]:
+        for number, step in enumerate(self.passes):
+            self.now = number
+            rows = [[c for c in row if c.name in self.needed] for row in step.rows]
+            yield from self._rows(Pass(tuple(map(tuple, rows)), step.summaries))
+            yield from self._scalar_lines(s for s in step.summaries if s.name in self.needed)
+
+    def _rows(self, step: Pass) -> Iterator[str]:
+        """The start rows one by one, then the loop; lags are shifted at the end of each row."""
+        general = step.rows[-1]
+        if not general:
+            return
+        depth = self._depths(general)
+        for name, deepest in depth.items():
+            for back in range(1, deepest + 1):
+                yield f"        kfsheet_{back}_{name} = nan"
+        for row, columns in enumerate(step.rows[:-1]):
+            yield f"        t = {row}"
+            yield from self._one_row(columns, row, depth, " " * 8)
+        yield f"        for t in range({len(step.rows) - 1}, rows):"
+        yield from self._one_row(general, len(step.rows) - 1, depth, " " * 12)
+
+    def _one_row(
+        self, columns: tuple[Column, ...], row: int, depth: dict[str, int], indent: str
+    ) -> Iterator[str]:
+        for column in columns:
+            rule = column.definition(row)
+            yield f"{indent}{column.name} = float({self._code(rule)})"
+            if column.name in self.stored:
+                yield f"{indent}kfsheet_out[{self.stored[column.name]}, t] = {column.name}"
+        for name, deepest in depth.items():
+            for back in range(deepest, 0, -1):
+                source = f"kfsheet_{back - 1}_{name}" if back > 1 else name
+                yield f"{indent}kfsheet_{back}_{name} = {source}"
+
+    def _depths(self, columns: tuple[Column, ...]) -> dict[str, int]:
+        """How far back each column of this pass is read."""
+        depth: dict[str, int] = {}
+        for column in columns:
+            for rule in column.rules:
+                for cell in sorted(column_references(rule), key=str):
+                    name, back = str(cell.base.label), int(lag(cell))
+                    same_pass = self.level.get(name) == self.now
+                    if back and same_pass and not self.model.column(name).is_data:
+                        depth[name] = max(depth.get(name, 0), back)
+        return depth
+
+    def _tail(self) -> list[str]:
+        return [
+            f"        kfsheet_rs[kfsheet_k - kfsheet_first, {n}] = {name}"
+            for n, name in enumerate(self.scalars)
+        ]
+
+
+PRELUDE = '''"""Generated by kfsheet; this file may be deleted at any time."""
+
+from math import atan, atan2, ceil, cos, cosh, exp, floor, nan, pi, sin, sinh, tan, tanh, asinh
+
+from kfsheet.fastmath import (
+    acos, acosh, asin, atanh, compiled, count, largest, last, log, mean, observed, power, rms,
+    sign, smallest, sqrt, std, sumproduct, total
+)
+
+
+@compiled'''
+
+
+@lru_cache
+def _folder(chosen: str) -> Path:
+    """The folder chosen, or one for this process where that cannot be written."""
+    folder = Path(chosen) / "kernels"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError:
+        return Path(tempfile.mkdtemp(prefix="kfsheet-"))
+
+
+def cache_folder() -> Path:
+    """Where compiled kernels are kept: KFSHEET_CACHE, or the user's cache directory."""
+    return _folder(os.environ.get("KFSHEET_CACHE") or user_cache_dir("kfsheet"))
+
+
+def _file_of(source: str) -> Path:
+    """File of a source, named by a digest of it and of all that its machine code depends on."""
+    import numba
+
+    from kfsheet import fastmath
+
+    versions = f"{sys.version}{numba.__version__}{inspect.getsource(fastmath)}"
+    digest = hashlib.sha256((source + versions).encode()).hexdigest()[:32]
+    return cache_folder() / f"kernel_{digest}.py"
+
+
+def is_ready(kernel: Kernel) -> bool:
+    """Whether a kernel has been compiled on this machine before."""
+    path = _file_of(kernel.source)
+    return any(path.parent.glob(f"__pycache__/{path.stem}.*.nbi"))
+
+
+@lru_cache(maxsize=64)
+def compiled_function(source: str) -> Callable:
+    """The compiled function of a kernel's source; from disk if it was compiled before."""
+    path = _file_of(source)
+    if not path.exists():
+        write_file(path, source.encode())
+    specification = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(specification)
+    sys.modules[path.stem] = module  # the cache looks the module up by its name
+    specification.loader.exec_module(module)
+    return module.kernel

@@ -1,0 +1,483 @@
+"""Many runs of one recurrence: an ensemble, and statistics of it that need little memory.
+
+Members are computed in groups, each by one task that returns sums, never rows; so memory does not
+grow with their number. Groups are the same and are added in the same order whoever computes them:
+threads of this process, other processes, or other machines through any ``concurrent.futures``
+executor. The result is then the same to the last bit.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import islice
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kfsheet.errors import DataError, ModelError
+from kfsheet.evaluation import can_compile, check_data_name, checked_array, facts_of
+from kfsheet.kernel import Kernel, compiled_function, kernel_of
+from kfsheet.pythoncode import python_source
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from kfsheet.recurrence import Recurrence
+
+GROUP = 16  # members a task, so that its rows fit into the cache of a core
+STATISTICS = ("mean", "rms", "std", "count")
+
+
+@dataclass(frozen=True)
+class Draws:
+    """Standard-normal draws for data columns, other ones for every member.
+
+    Member k draws from ``numpy.random.RandomState((seed, k))``, column after column; so a member
+    has the same draws however many there are, and whoever computes it.
+
+    Parameters
+    ----------
+    columns : sequence of str
+        The data columns.
+    seed : int
+        From 0 to 2**32 - 1.
+    """
+
+    columns: tuple[str, ...]
+    seed: int = 0
+
+    def __init__(self, *columns: str, seed: int = 0) -> None:
+        if not columns or not all(isinstance(name, str) for name in columns):
+            raise DataError("Draws needs the names of data columns: Draws('n_theta', seed=1)")
+        if not isinstance(seed, int) or not 0 <= seed < 2**32:
+            raise DataError(f"seed is {seed!r}; it must be a whole number from 0 to 2**32 - 1")
+        object.__setattr__(self, "columns", columns)
+        object.__setattr__(self, "seed", seed)
+
+    def of(self, member: int, rows: int) -> np.ndarray:
+        """The draws of a member, one row a column: shape (columns, rows)."""
+        state = np.random.RandomState((self.seed, member))
+        return state.standard_normal((len(self.columns), rows))
+
+
+@dataclass(frozen=True)
+class NEES:
+    """Normalised estimation error squared, e' P^-1 e, from the columns of a filter.
+
+    Parameters
+    ----------
+    states : sequence of str
+        Names of the state: ``("x", "vx")``.
+    errors : str
+        Pattern of the columns of the errors: ``"e_{}_a"``.
+    covariance : str
+        Pattern of the columns of the covariance, upper triangle: ``"P_{}{}_a"``. An entry that
+        has no column is 0.
+    """
+
+    states: tuple[str, ...]
+    errors: str = "e_{}_a"
+    covariance: str = "P_{}{}_a"
+
+    def error_columns(self) -> list[str]:
+        """Names of the columns of the errors."""
+        return [self.errors.format(state) for state in self.states]
+
+    def covariance_columns(self, model: Recurrence) -> dict[tuple[int, int], str]:
+        """Names of the columns of the covariance that the model has, by place."""
+        known = {c.name for c in model.all_columns()}
+        names = {
+            (i, j): self.covariance.format(a, b)
+            for i, a in enumerate(self.states)
+            for j, b in enumerate(self.states)
+            if i <= j
+        }
+        if missing := [n for (i, j), n in names.items() if i == j and n not in known]:
+            raise ModelError(f"NEES needs the column {missing[0]}, which {model.name} lacks")
+        return {place: name for place, name in names.items() if name in known}
+
+
+@dataclass
+class Study:
+    """What many runs say: statistics over the members.
+
+    Attributes
+    ----------
+    members : int
+        How many runs.
+    rows : dict of str to DataFrame
+        For each column asked for, and each NEES, the statistics of every step over the members:
+        ``mean``, ``rms``, ``std`` (n - 1) and ``count``, members without a value left out.
+    scalars : DataFrame
+        For each scalar of the model ``mean``, ``rms``, ``std``, ``count`` and the quantiles asked.
+    """
+
+    members: int
+    rows: dict[str, pd.DataFrame]
+    scalars: pd.DataFrame
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What one group needs, free of the model so that it can travel."""
+
+    kernel: Kernel
+    python: str
+    name: str
+    rows: int
+    first: int
+    last: int
+    parameters: np.ndarray
+    data: dict[str, np.ndarray]
+    draws: Draws | None
+    statistics: tuple[int, ...]
+    nees: tuple[tuple[tuple[int, ...], tuple[tuple[int, int, int], ...]], ...]
+    compile: bool
+
+
+@dataclass
+class _Sums:
+    """Counts, sums and sums of squares over members, and the members' scalars."""
+
+    count: np.ndarray
+    total: np.ndarray
+    squares: np.ndarray
+    scalars: np.ndarray
+
+    @classmethod
+    def of(cls, values: np.ndarray, scalars: np.ndarray) -> _Sums:
+        """Sums over the first axis, values that are missing left out."""
+        there = ~np.isnan(values)
+        filled = np.where(there, values, 0.0)
+        return cls(there.sum(axis=0), filled.sum(axis=0), (filled**2).sum(axis=0), scalars)
+
+    def add(self, other: _Sums) -> None:
+        """Add another group's."""
+        self.count, self.total = self.count + other.count, self.total + other.total
+        self.squares = self.squares + other.squares
+        self.scalars = np.concatenate([self.scalars, other.scalars])
+
+
+def study(
+    model: Recurrence,
+    members: int,
+    data: Mapping[str, Any] | Draws | None,
+    columns: Sequence[str],
+    quantiles: Sequence[float],
+    nees: Mapping[str, NEES],
+    executor: Executor | None,
+    parameters: Mapping[str, Any],
+) -> Study:
+    """Run a recurrence for many members; :func:`kfsheet.evaluate` with ``members`` calls it.
+
+    Parameters
+    ----------
+    model : Recurrence
+        What to run.
+    members : int
+        How many runs, from 1 up.
+    data : mapping or Draws
+        Data columns: a vector for all members, an array (members, rows), or draws.
+    columns : sequence of str
+        Columns of which statistics over the members are wanted, step by step.
+    quantiles : sequence of float
+        Quantiles of the scalars over the members, from 0 to 1.
+    nees : mapping of str to NEES
+        Further quantities, by a name of their own.
+    executor : Executor, optional
+        Who computes; threads on all cores by default. Processes need pickles of the arrays only.
+    parameters : mapping
+        Values, or arrays of length ``members``.
+
+    Raises
+    ------
+    DataError
+        For an unknown name, a shape that does not fit, a value that is not allowed, or a member
+        whose computation has no value; the message names the member.
+    """
+    if not isinstance(members, int) or members < 1:
+        raise DataError(f"members is {members!r}; give a whole number from 1 up")
+    if any(not 0 <= q <= 1 for q in quantiles):
+        raise DataError(f"quantiles are {quantiles!r}; each lies between 0 and 1")
+    names = [*dict.fromkeys(columns)]
+    task = _first_task(model, members, data, names, nees, parameters)
+    sums = _computed(task, members, executor)
+    return _study(model, members, [*names, *nees], task.kernel.scalars, sums, quantiles)
+
+
+def _first_task(
+    model: Recurrence,
+    members: int,
+    data: Mapping[str, Any] | Draws | None,
+    names: list[str],
+    nees: Mapping[str, NEES],
+    parameters: Mapping[str, Any],
+) -> _Task:
+    """The task of all members, to be cut into groups."""
+    facts = facts_of(model)
+    facts.wanted(model, names)
+    needed = list(names)
+    for spec in nees.values():
+        needed += [*spec.error_columns(), *spec.covariance_columns(model).values()]
+    wanted = tuple(dict.fromkeys(needed))
+    facts.wanted(model, wanted)
+    kernel = kernel_of(model, model.version, wanted)
+    place = {name: n for n, name in enumerate(kernel.columns)}
+    draws = data if isinstance(data, Draws) else None
+    series = dict(facts.default)
+    for name in draws.columns if draws else ():
+        check_data_name(name, series, model)
+    for name, values in ({} if draws else data or {}).items():
+        check_data_name(name, series, model)
+        series[name] = _member_data(model, name, values, members)
+    return _Task(
+        kernel,
+        "" if can_compile() else python_source(model),
+        model.name,
+        facts.rows,
+        0,
+        members,
+        _member_parameters(model, parameters, members),
+        series,
+        draws,
+        tuple(place[name] for name in names),
+        tuple(
+            (
+                tuple(place[name] for name in spec.error_columns()),
+                tuple((*at, place[n]) for at, n in spec.covariance_columns(model).items()),
+            )
+            for spec in nees.values()
+        ),
+        can_compile(),
+    )
+
+
+def _member_data(model: Recurrence, name: str, values: Any, members: int) -> np.ndarray:
+    array = np.asarray(values)
+    if array.ndim != 2:
+        return checked_array(model, name, values)[None, :]
+    if array.shape != (members, model.rows) or array.dtype.kind not in "fiu":
+        raise DataError(
+            f"{name} has the shape {array.shape}; give {members} x {model.rows} numbers "
+            "(members x rows), or one row for all members"
+        )
+    array = np.ascontiguousarray(array, dtype=float)
+    bad = ~np.isfinite(array)
+    if model.table[name].may_be_missing:
+        bad &= ~np.isnan(array)
+    if bad.any():
+        member, row = (int(k[0]) for k in np.nonzero(bad))
+        raise DataError(f"{name}, member {member}, row {row} is {array[member, row]}, no number")
+    return array
+
+
+def _member_parameters(model: Recurrence, given: Mapping[str, Any], members: int) -> np.ndarray:
+    """Parameter values of shape (1 or members, parameters)."""
+    many = {n: np.asarray(v) for n, v in given.items() if np.ndim(v) == 1}
+    from kfsheet.evaluation import checked_parameters
+
+    one = checked_parameters(model, {n: v for n, v in given.items() if n not in many})
+    table = np.tile(np.array([list(one.values())]), (members if many else 1, 1))
+    for name, values in many.items():
+        if name not in one or len(values) != members:
+            raise DataError(
+                f"parameter {name} has {len(values)} values for {members} members"
+                if name in one
+                else f"{model.name} has no parameter {name}; it has {', '.join(one)}"
+            )
+        checked = [
+            model.parameters[name].checked(v, f" of member {k}") for k, v in enumerate(values)
+        ]
+        table[:, list(one).index(name)] = checked
+    return table
+
+
+# -- computing -----------------------------------------------------------------------------
+
+
+def _computed(task: _Task, members: int, executor: Executor | None) -> _Sums:
+    if executor is not None:
+        return _gathered(task, members, executor)
+    workers = os.cpu_count() or 1
+    if task.compile:
+        compiled_function(task.kernel.source)  # once, before the threads ask for it together
+    pool = ThreadPoolExecutor(workers)
+    try:
+        return _gathered(task, members, pool)
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _gathered(task: _Task, members: int, executor: Executor) -> _Sums:
+    """Sums of all groups, in order, with few of them under way at a time."""
+    waiting = iter(_groups(task, members))
+    running = [executor.submit(_run_group, t) for t in islice(waiting, 4 * (os.cpu_count() or 1))]
+    sums: _Sums | None = None
+    bar = _bar(members)
+    try:
+        while running:
+            found = running.pop(0).result()
+            running += [executor.submit(_run_group, t) for t in islice(waiting, 1)]
+            bar.update(len(found.scalars))
+            if sums is None:
+                sums = found
+            else:
+                sums.add(found)
+    finally:
+        bar.close()
+        for future in running:
+            future.cancel()
+    assert sums is not None  # there is at least one member
+    return sums
+
+
+def _bar(members: int) -> Any:
+    from tqdm import tqdm
+
+    return tqdm(total=members, unit=" runs", leave=False, disable=not sys.stderr.isatty())
+
+
+def _groups(task: _Task, members: int) -> Iterator[_Task]:
+    from dataclasses import replace
+
+    for first in range(0, members, GROUP):
+        last = min(first + GROUP, members)
+
+        def part(array: np.ndarray, first: int = first, last: int = last) -> np.ndarray:
+            return array if len(array) == 1 else array[first:last]
+
+        yield replace(
+            task,
+            first=first,
+            last=last,
+            parameters=part(task.parameters),
+            data={name: part(array) for name, array in task.data.items()},
+        )
+
+
+def _run_group(task: _Task) -> _Sums:
+    """Run one group and keep what is asked for; this is what an executor executes."""
+    number = task.last - task.first
+    data = dict(task.data)
+    if task.draws:
+        drawn = [task.draws.of(member, task.rows) for member in range(task.first, task.last)]
+        for k, name in enumerate(task.draws.columns):
+            data[name] = np.ascontiguousarray([member[k] for member in drawn])
+    out = np.empty((number, len(task.kernel.columns), task.rows))
+    results = np.empty((number, len(task.kernel.scalars)))
+    run = _run_compiled if task.compile else _run_python
+    run(task, data, out, results)
+    if np.isinf(out).any():
+        member = task.first + int(np.nonzero(np.isinf(out))[0][0])
+        raise DataError(f"{task.name}, member {member}: a value grows beyond all bounds")
+    nees = [_nees(out[:, list(e)], out, at) for e, at in task.nees]
+    values = np.concatenate([out[:, list(task.statistics)], *(n[:, None] for n in nees)], axis=1)
+    return _Sums.of(values, results)
+
+
+def _run_compiled(
+    task: _Task, data: dict[str, np.ndarray], out: np.ndarray, results: np.ndarray
+) -> None:
+    function = compiled_function(task.kernel.source)
+    series = [data[name] for name in task.kernel.data]
+    try:
+        function(0, len(out), task.parameters, *series, out, results)
+    except (ArithmeticError, ValueError) as error:
+        raise DataError(_which(task, data, out, results, error)) from None
+
+
+def _which(
+    task: _Task,
+    data: dict[str, np.ndarray],
+    out: np.ndarray,
+    results: np.ndarray,
+    error: Exception,
+) -> str:
+    """Which member it was: run one at a time."""
+    function = compiled_function(task.kernel.source)
+    series = [data[name] for name in task.kernel.data]
+    for k in range(len(out)):
+        try:
+            function(k, k + 1, task.parameters, *series, out[k : k + 1], results[k : k + 1])
+        except (ArithmeticError, ValueError):
+            return (
+                f"{task.name}, member {task.first + k} has no value: {error}; "
+                "run it alone to see where"
+            )
+    return f"{task.name}: {error}"
+
+
+def _run_python(
+    task: _Task, data: dict[str, np.ndarray], out: np.ndarray, results: np.ndarray
+) -> None:
+    """The same without a compiler."""
+    namespace: dict[str, Any] = {}
+    exec(compile(task.python, f"<kfsheet {task.name}>", "exec"), namespace)  # printed by us
+    for k in range(len(out)):
+        values = task.parameters[min(k, len(task.parameters) - 1)].tolist()
+        series = {name: rows[min(k, len(rows) - 1)].tolist() for name, rows in data.items()}
+        try:
+            columns, scalars = namespace[task.name](
+                **series, **dict(zip(task.kernel.parameters, values, strict=True))
+            )
+        except (ArithmeticError, ValueError, TypeError) as error:
+            raise DataError(
+                f"{task.name}, member {task.first + k} has no value: {error}; "
+                "run it alone to see where"
+            ) from None
+        out[k] = [columns[name] for name in task.kernel.columns]
+        results[k] = [scalars[name] for name in task.kernel.scalars]
+
+
+def _nees(
+    errors: np.ndarray, out: np.ndarray, entries: tuple[tuple[int, int, int], ...]
+) -> np.ndarray:
+    """E' P^-1 e of every member and row, NaN where an error is missing."""
+    number, n, rows = errors.shape
+    P = np.zeros((number, rows, n, n))
+    for i, j, place in entries:
+        P[:, :, i, j] = P[:, :, j, i] = out[:, place]
+    e = errors.transpose(0, 2, 1)
+    there = ~np.isnan(e).any(axis=-1)
+    P[~there] = np.eye(n)
+    solved = np.linalg.solve(P, np.where(there[..., None], e, 0.0)[..., None])[..., 0]
+    return np.where(there, (e * solved).sum(axis=-1), np.nan)
+
+
+# -- the result ----------------------------------------------------------------------------
+
+
+def _study(
+    model: Recurrence,
+    members: int,
+    names: list[str],
+    scalars: tuple[str, ...],
+    sums: _Sums,
+    quantiles: Sequence[float],
+) -> Study:
+    import pandas as pd
+
+    rows = {
+        name: pd.DataFrame(
+            _statistics(sums.count[k], sums.total[k], sums.squares[k]),
+            index=pd.RangeIndex(model.rows, name=model.step),
+        )
+        for k, name in enumerate(names)
+    }
+    whole = _Sums.of(sums.scalars, sums.scalars)
+    table = pd.DataFrame(_statistics(whole.count, whole.total, whole.squares), index=scalars)
+    for q in quantiles:
+        table[f"{q:.4g} quantile"] = np.nanquantile(sums.scalars, q, axis=0)
+    return Study(members, rows, table)
+
+
+def _statistics(count: np.ndarray, total: np.ndarray, squares: np.ndarray) -> dict[str, np.ndarray]:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean, mean_square = total / count, squares / count
+        spread = np.maximum(mean_square - mean**2, 0) * count / (count - 1)
+        found = (mean, np.sqrt(mean_square), np.sqrt(spread), count)
+        return dict(zip(STATISTICS, found, strict=True))

@@ -1,0 +1,374 @@
+"""Compiled runs and many runs compute what single runs by Python compute."""
+
+import os
+import subprocess
+import sys
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+
+import numpy as np
+import pytest
+from sympy import Max, Piecewise, Rational, acos, atan2, cos, floor, log, sin, sqrt
+
+from kfsheet import (
+    NEES,
+    RMS,
+    DataError,
+    Draws,
+    Largest,
+    Last,
+    Mean,
+    Missing,
+    ModelError,
+    Recurrence,
+    Smallest,
+    Std,
+    Sum,
+    evaluate,
+    t,
+    warm_up,
+    when_observed,
+)
+from kfsheet import evaluation as engine
+from kfsheet.exercises.cannonball import cannonball
+from kfsheet.exercises.football import football
+from kfsheet.kernel import cache_folder, compiled_function, is_ready, kernel_of
+
+ROWS = 25
+
+
+def mixed():
+    """Lags, start rows, gaps, several passes and every kind of function."""
+    m = Recurrence("mixed", title="A bit of everything")
+    a = m.parameter("a", 0.3, "", "a", sign="positive")
+    p = m.parameter("p", 1.5, "", "an exponent")
+    values = np.random.RandomState(1).standard_normal(ROWS)
+    gaps = values.copy()
+    gaps[[3, 7, 8]] = np.nan
+    x = m.data("x", values, "", "complete", section="S")
+    y = m.data("y", gaps, "", "with gaps", section="S", may_be_missing=True)
+    u, v, w, z, c = m.columns("u", "v", "w", "z", "c", section="S")
+    m.define(u[t], u[t - 1] + a * v[t - 2] - x[t], "", "u", start=[0, 1 + a])
+    m.define(v[t], cos(u[t]) * (1 + x[t] ** 2) ** p, "", "v", start=[sqrt(a)])
+    m.define(w[t], when_observed(y[t], atan2(y[t], x[t - 1]) + floor(2 * y[t])), "", "w", start=[0])
+    mean = m.summary("mean_w", Mean(w), "", "mean")
+    m.define(z[t], log(1 + v[t] ** 2) * mean + z[t - 1] / 2, "", "second pass", start=[mean])
+    m.summary("std_z", Std(z), "", "spread")
+    clipped = Piecewise((Missing, z[t] > 1), (Max(z[t], acos(sin(x[t])), Rational(1, 3)), True))
+    m.define(c[t], clipped, "", "gaps of its own")
+    for aggregate in (RMS, Sum, Largest, Smallest, Last):
+        m.summary(f"{aggregate.__name__.lower()}_c", aggregate(c), "", "of c")
+    return m
+
+
+@pytest.fixture
+def by_python(monkeypatch):
+    """What Python alone computes."""
+
+    def compute(*arguments, **options):
+        with monkeypatch.context() as patch:
+            patch.setattr(engine, "can_compile", lambda: False)
+            return evaluate(*arguments, **options)
+
+    return compute
+
+
+def assert_same(ours, theirs, tolerance):
+    assert list(ours.columns) == list(theirs.columns)
+    for name in ours:
+        a, b = ours[name].to_numpy(), theirs[name].to_numpy()
+        assert (np.isnan(a) == np.isnan(b)).all(), name
+        scale = np.sqrt(np.nanmean(b**2)) if not np.isnan(b).all() else 1
+        assert np.nanmax(np.abs(a - b), initial=0) <= tolerance * max(scale, 1e-300), name
+
+
+@pytest.mark.parametrize(
+    ("model", "tolerance"),
+    [(mixed(), 1e-13), (football, 1e-13), (cannonball, 2e-12)],
+    ids=["mixed", "football", "cannonball"],
+)
+def test_compiled_and_python_agree(by_python, model, tolerance):
+    warm_up(model)
+    ours, theirs = evaluate(model), by_python(model)
+    assert_same(ours, theirs, tolerance)
+    for name, value in theirs.attrs["scalars"].items():
+        found = ours.attrs["scalars"][name]
+        assert found == pytest.approx(value, rel=10 * tolerance, nan_ok=True), name
+
+
+def test_a_few_columns_are_the_same_as_all():
+    some = ["z", "u"]
+    model = mixed()
+    warm_up(model, some)
+    warm_up(model)
+    assert evaluate(model, columns=some).equals(evaluate(model)[some])
+    with pytest.raises(ModelError, match="no column 'q'"):
+        evaluate(model, columns=["q"])
+
+
+@pytest.mark.parametrize(
+    ("rule", "message"),
+    [
+        (lambda v, a: sqrt(v[t - 1] - a), "v in row 3.*math domain error"),
+        (lambda v, a: log(v[t - 1]) + v[t - 1] - a, "math domain error"),
+        (lambda v, a: 1 / (v[t - 1] - 1), "division by zero"),
+        (lambda v, a: (v[t - 1] + 12) ** 12, "beyond 1e308"),
+    ],
+)
+def test_what_has_no_value_is_explained_as_before(rule, message):
+    m = Recurrence("fails", title="Fails", rows=30)
+    a = m.parameter("a", 0.5, "", "a")
+    (v,) = m.columns("v", section="S")
+    m.define(v[t], rule(v, a), "", "v", start=[1])
+    engine.facts_of(m).python_cells = engine.WORTH_COMPILING
+    with pytest.raises(DataError, match=message):
+        evaluate(m)
+
+
+def test_a_first_small_run_does_not_wait_for_a_compiler():
+    model = mixed()
+    model.parameter("unlike", 0, "", "so that its kernel is a new one")
+    evaluate(model)
+    assert not is_ready(kernel_of(model, model.version))
+    for _ in range(engine.WORTH_COMPILING // (ROWS * len(model.all_columns())) + 1):
+        evaluate(model)
+    assert is_ready(kernel_of(model, model.version))
+
+
+PROGRAM = """
+import sys
+sys.path.insert(0, {folder!r})
+from test_members import mixed
+from kfsheet import evaluate, warm_up
+from kfsheet.kernel import compiled_function, kernel_of
+model = mixed()
+warm_up(model)
+stats = compiled_function(kernel_of(model, model.version).source).stats
+print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
+"""
+
+
+def test_a_second_process_finds_the_machine_code_on_disk(tmp_path):
+    program = PROGRAM.format(folder=os.path.dirname(__file__))
+    environment = {**os.environ, "KFSHEET_CACHE": str(tmp_path)}
+    found = [
+        subprocess.run(
+            [sys.executable, "-c", program],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout.split()
+        for _ in range(2)
+    ]
+    assert found == [["0", "1"], ["1", "0"]]
+
+
+def test_a_cache_that_cannot_be_written_does_not_stop_anybody(monkeypatch, tmp_path):
+    blocker = tmp_path / "file"
+    blocker.write_text("in the way")
+    monkeypatch.setenv("KFSHEET_CACHE", str(blocker))
+    assert cache_folder().is_dir()
+    assert blocker.read_text() == "in the way"
+
+
+# -- many members ----------------------------------------------------------------------------
+
+MANY = 50  # more than three groups
+
+
+def flights(count=MANY, **options):
+    return evaluate(football, members=count, columns=["e_x_a", "d_i"], **options)
+
+
+@pytest.fixture(scope="module")
+def photos():
+    noise = np.random.RandomState(5).standard_normal((MANY, 16))
+    pixels = np.array(football.table["i"].values) + 3 * noise
+    pixels[7, 3] = pixels[40, 15] = np.nan
+    return {"i": pixels}
+
+
+def test_members_are_the_single_runs_bit_for_bit(photos):
+    r_i = np.linspace(1, 100, MANY)
+    study = flights(data=photos, r_i=r_i, h=0, p=2)
+    warm_up(football)
+    singles = [evaluate(football, {"i": photos["i"][k]}, r_i=r_i[k], h=0, p=2) for k in range(MANY)]
+    for name in ("e_x_a", "d_i"):
+        stack = np.array([run[name] for run in singles])
+        found = study.rows[name]
+        assert (found["count"] == (~np.isnan(stack)).sum(axis=0)).all()
+        some = found["count"] > 0
+        np.testing.assert_allclose(
+            found["mean"][some], np.nanmean(stack[:, some], axis=0), rtol=1e-12
+        )
+        np.testing.assert_allclose(
+            found["std"][some], np.nanstd(stack[:, some], axis=0, ddof=1), rtol=1e-9
+        )
+    one = flights(1, data={"i": photos["i"][:1]}, r_i=r_i[:1], h=0, p=2)
+    assert (one.rows["e_x_a"]["mean"] == singles[0]["e_x_a"]).all()
+    assert one.scalars.loc["rms_x_a", "mean"] == singles[0].attrs["scalars"]["rms_x_a"]
+
+
+def test_quantiles_of_scalars_are_those_of_the_members(photos):
+    study = flights(data=photos, quantiles=(0.05, 0.5))
+    values = [
+        evaluate(football, {"i": photos["i"][k]}).attrs["scalars"]["rms_x_a"] for k in range(MANY)
+    ]
+    found = study.scalars.loc["rms_x_a", ["0.05 quantile", "0.5 quantile"]]
+    np.testing.assert_allclose(found, np.quantile(values, [0.05, 0.5]), rtol=1e-12)
+
+
+def executors():
+    yield "one thread", lambda: ThreadPoolExecutor(1)
+    yield "processes", lambda: ProcessPoolExecutor(2, mp_context=get_context("spawn"))
+
+
+@pytest.mark.parametrize("make", [m for _, m in executors()], ids=[n for n, _ in executors()])
+def test_whoever_computes_the_result_is_the_same_to_the_last_bit(photos, make):
+    here = flights(data=photos)
+    with make() as executor:
+        there = flights(data=photos, executor=executor)
+    assert all(here.rows[name].equals(there.rows[name]) for name in here.rows)
+    assert here.scalars.equals(there.scalars)
+
+
+@pytest.mark.filterwarnings("ignore")  # what a cluster warns of is its own affair
+def test_a_cluster_computes_the_same(photos):
+    distributed = pytest.importorskip("distributed")
+    here = flights(data=photos)
+    with (
+        distributed.LocalCluster(
+            n_workers=1,
+            threads_per_worker=1,
+            processes=False,
+            protocol="tcp://",
+            dashboard_address=None,
+            host="127.0.0.1",
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        there = flights(data=photos, executor=client.get_executor())
+    assert all(here.rows[name].equals(there.rows[name]) for name in here.rows)
+
+
+def test_without_a_compiler_the_statistics_are_the_same(monkeypatch, photos):
+    from kfsheet import members
+
+    fast = flights(data=photos)
+    monkeypatch.setattr(members, "can_compile", lambda: False)
+    slow = flights(data=photos)
+    for name in fast.rows:
+        np.testing.assert_allclose(slow.rows[name], fast.rows[name], rtol=1e-9, atol=1e-12)
+
+
+def test_draws_belong_to_the_member_not_to_the_group():
+    draws = Draws("n_theta", "n_r", seed=3)
+    few = evaluate(cannonball, draws, members=3, columns=["NIS"])
+    state = np.random.RandomState((3, 2)).standard_normal((2, 1320))
+    last = evaluate(cannonball, {"n_theta": state[0], "n_r": state[1]})
+    two = evaluate(cannonball, draws, members=2, columns=["NIS"])
+    total = few.rows["NIS"]["mean"] * 3 - two.rows["NIS"]["mean"] * 2
+    np.testing.assert_allclose(total[1:], last["NIS"][1:], rtol=1e-7, atol=1e-9)
+
+
+def test_nees_is_the_quadratic_form_of_the_errors():
+    draws = Draws("n_theta", "n_r", seed=3)
+    study = evaluate(cannonball, draws, members=1, nees={"NEES": NEES(("x", "vx", "y", "vy"))})
+    state = draws.of(0, 1320)
+    run = evaluate(cannonball, {"n_theta": state[0], "n_r": state[1]})
+    for row in (0, 1, 700, 1319):
+        at, names = run.loc[row], ["x", "vx", "y", "vy"]
+        P = np.array(
+            [[at[f"P_{names[min(i, j)]}{names[max(i, j)]}_a"] for j in range(4)] for i in range(4)]
+        )
+        e = at[[f"e_{n}_a" for n in names]].to_numpy()
+        assert study.rows["NEES"]["mean"][row] == pytest.approx(e @ np.linalg.inv(P) @ e, rel=1e-6)
+
+
+MEMORY = """
+import resource
+from kfsheet import Draws, NEES, evaluate
+from kfsheet.exercises.cannonball import cannonball
+evaluate(cannonball, Draws("n_theta", "n_r"), members={members}, columns=["NIS", "e_x_a"],
+         nees={{"NEES": NEES(("x", "vx", "y", "vy"))}}, quantiles=(0.5,))
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+"""
+
+
+def test_memory_does_not_grow_with_the_number_of_members():
+    used = [
+        float(
+            subprocess.run(
+                [sys.executable, "-c", MEMORY.format(members=members)],
+                capture_output=True,
+                text=True,
+                check=True,
+            ).stdout
+        )
+        for members in (300, 1500)
+    ]
+    assert max(used) < 500
+    assert used[1] - used[0] < 30
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"members": 0}, "give a whole number from 1 up"),
+        ({"members": 2.5}, "give a whole number"),
+        ({"members": 3, "quantiles": (2,)}, "between 0 and 1"),
+        ({"members": 3, "columns": ["q"]}, "no column 'q'"),
+        ({"members": 3, "q": 1}, "no parameter q"),
+        ({"members": 3, "q": [1, 2, 3]}, "no parameter q"),
+        ({"members": 3, "r_i": [1, 2]}, "2 values for 3 members"),
+        ({"members": 3, "r_i": [1, -2, 3]}, "r_i of member 1 is -2"),
+        ({"members": 3, "data": {"i": np.ones((2, 16))}}, "give 3 x 16 numbers"),
+        ({"members": 3, "data": {"q": np.ones(16)}}, "no data column q"),
+        ({"members": 3, "data": Draws("q")}, "no data column q"),
+        ({"members": 2, "data": {"i": np.full((2, 16), np.inf)}}, "member 0, row 0 is inf"),
+        ({"members": 2, "nees": {"N": NEES(("q",))}}, "no column 'e_q_a'|lacks"),
+        ({"quantiles": (0.5,)}, "give members="),
+    ],
+)
+def test_a_study_that_cannot_be_is_refused(options, message):
+    data = options.pop("data", None)
+    with pytest.raises((DataError, ModelError), match=message):
+        evaluate(football, data, **options)
+
+
+def test_a_member_without_a_value_is_named():
+    m = Recurrence("fails", title="Fails", rows=3)
+    a = m.parameter("a", 1, "", "a")
+    (v,) = m.columns("v", section="S")
+    m.define(v[t], sqrt(a) * v[t - 1], "", "v", start=[1])
+    values = np.ones(100)
+    values[83] = -1
+    with pytest.raises(DataError, match="member 83 has no value"):
+        evaluate(m, members=100, columns=["v"], a=values)
+
+
+@pytest.mark.parametrize("arguments", [(), (1,)])
+def test_draws_need_names(arguments):
+    with pytest.raises(DataError, match="names of data columns"):
+        Draws(*arguments)
+    with pytest.raises(DataError, match="seed"):
+        Draws("i", seed=-1)
+
+
+def test_an_interrupt_leaves_nothing_running(monkeypatch):
+    from kfsheet import members
+
+    def interrupted(task):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(members, "_run_group", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        flights(1000)
+    monkeypatch.undo()
+    assert flights(10).members == 10
+
+
+def test_the_compiled_function_is_the_same_object_for_the_same_model():
+    kernel = kernel_of(football, football.version)
+    assert compiled_function(kernel.source) is compiled_function(kernel.source)
