@@ -1,10 +1,11 @@
 # make          set up .venv, build the workbooks, execute the notebooks
 # make test     run every test
+# make bench    measure, beside the peers
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: all workbooks notebooks test format pin clean
+.PHONY: all workbooks notebooks test format bench pin clean
 .DEFAULT_GOAL := all
 
 all: workbooks notebooks
@@ -36,6 +37,10 @@ test: $(READY)
 format: $(READY)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+bench: $(READY)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r benchmarks/requirements.txt
+	$(BIN)/python benchmarks/bench.py
 
 # After a change of pyproject.toml; needs uv, which `pip install uv` brings.
 pin:

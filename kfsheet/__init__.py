@@ -28,9 +28,10 @@ _HOMES = {
     "kfsheet.latex": "latex_code",
     "kfsheet.members": "Draws NEES Study",
     "kfsheet.plots": "draw",
-    "kfsheet.pythoncode": "python_code python_source",
+    "kfsheet.pythoncode": "python_code",
     "kfsheet.recurrence": "Recurrence",
     "kfsheet.show": "formula_table",
+    "kfsheet.source": "python_source",
     "kfsheet.tables": "read_table",
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names.split()}

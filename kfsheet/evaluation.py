@@ -22,7 +22,7 @@ import numpy as np
 from kfsheet.errors import DataError
 from kfsheet.kernel import Kernel, compiled_function, is_ready, kernel_of
 from kfsheet.parts import checked_values
-from kfsheet.pythoncode import python_source
+from kfsheet.source import python_source
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -42,6 +42,7 @@ def evaluate(
     *,
     columns: Sequence[str] | None = None,
     members: int | None = None,
+    scalars: Sequence[str] | None = None,
     quantiles: Sequence[float] = (),
     nees: Mapping[str, NEES] | None = None,
     executor: Executor | None = None,
@@ -62,7 +63,7 @@ def evaluate(
         With ``members``, those of which statistics are wanted; none by default.
     members : int, optional
         How many runs; the result is then a :class:`~kfsheet.members.Study`.
-    quantiles, nees, executor
+    scalars, quantiles, nees, executor
         With ``members``; see :func:`kfsheet.members.study`.
     **parameters : float
         Other values of parameters, by name; with ``members``, also arrays of that length.
@@ -88,11 +89,10 @@ def evaluate(
     if members is not None:
         from kfsheet.members import study
 
-        return study(
-            model, members, data, columns or (), quantiles, nees or {}, executor, parameters
-        )
-    if quantiles or nees or executor:
-        raise DataError("quantiles, nees and executor belong to many members; give members=")
+        wanted = columns or (), scalars, quantiles
+        return study(model, members, data, *wanted, nees or {}, executor, parameters)
+    if scalars is not None or quantiles or nees or executor:
+        raise DataError("scalars, quantiles, nees and executor need many members; give members=")
     return _one_run(model, data or {}, columns, parameters)
 
 
@@ -139,7 +139,8 @@ def _run_python(
     parameters: Mapping[str, float],
     wanted: tuple[str, ...],
 ) -> tuple[np.ndarray, dict[str, float]]:
-    found, scalars, _ = run(model, data, parameters)
+    only = None if wanted == facts_of(model).every else wanted
+    found, scalars, _ = run(model, data, parameters, only)
     return np.array([found[name] for name in wanted], dtype=float), scalars
 
 
@@ -239,21 +240,28 @@ def run(
     model: Recurrence,
     data: Mapping[str, Sequence[float]] | None = None,
     parameters: Mapping[str, float] | None = None,
+    wanted: tuple[str, ...] | None = None,
 ) -> tuple[dict[str, list[float]], dict[str, float], dict[str, float]]:
     """Columns, scalars and parameter values of one run by Python; see :func:`evaluate`."""
     values = checked_parameters(model, parameters or {})
     series = _checked_data(model, data or {})
-    function = _python_function(model, model.version)
+    function = _python_function(model, model.version, wanted)
     try:
         columns, scalars = function(**series, **values)
     except (ArithmeticError, ValueError, TypeError) as error:
         raise DataError(_explain(model, error)) from None
+    array = np.array(list(columns.values()))
+    if array.dtype.kind != "f" or np.isinf(array).any():
+        _check_finite(model, columns)
+    scalars = {name: nan if isinf(value) else value for name, value in scalars.items()}
+    return columns, scalars, values
+
+
+def _check_finite(model: Recurrence, columns: Mapping[str, list]) -> None:
     for name, column in columns.items():
         for row, value in enumerate(column):
             if isinstance(value, complex) or isinf(value):
                 raise DataError(f"{model.name}: {name} in row {row} is {value}, no finite number")
-    scalars = {name: nan if isinf(value) else value for name, value in scalars.items()}
-    return columns, scalars, values
 
 
 def checked_parameters(model: Recurrence, given: Mapping[str, Any]) -> dict[str, float]:
@@ -301,9 +309,11 @@ def _checked_column(model: Recurrence, name: str, values: Any) -> list[float]:
 
 
 @lru_cache(maxsize=32)
-def _python_function(model: Recurrence, version: int) -> Callable:
+def _python_function(
+    model: Recurrence, version: int, wanted: tuple[str, ...] | None = None
+) -> Callable:
     """The generated function of one version of a model."""
-    source = python_source(model)
+    source = python_source(model, wanted)
     filename = f"<kfsheet {model.name} {id(model)} {version}>"
     linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
     namespace: dict[str, Any] = {}

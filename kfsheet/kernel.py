@@ -1,4 +1,4 @@
-"""A recurrence as source for a compiler: the loop of :mod:`kfsheet.pythoncode`, in scalars.
+"""A recurrence as source for a compiler: the loop of :mod:`kfsheet.source`, in scalars.
 
 Only the columns that somebody wants are stored; all others are local variables, which a compiler
 keeps in registers. Numba compiles the source once and keeps the machine code in a cache on disk,
@@ -26,7 +26,7 @@ from kfsheet.checks import columns_read
 from kfsheet.expressions import column_references, lag
 from kfsheet.files import write_file
 from kfsheet.pythoncode import PythonPrinter
-from kfsheet.schedule import Pass
+from kfsheet.schedule import Pass, needed
 
 if TYPE_CHECKING:
     from kfsheet.parts import Column
@@ -89,7 +89,7 @@ class _Source:
         self.model, self.columns, self.scalars = model, columns, scalars
         self.passes = model.passes()
         self.level = {c.name: n for n, p in enumerate(self.passes) for c in p.rows[-1]}
-        self.needed = self._needed()
+        self.needed = needed(model, (*columns, *scalars))
         self.stored = self._stored()
         self.now = 0
         self._code = _Printer(self).doprint
@@ -115,24 +115,6 @@ class _Source:
     def whole(self, name: str) -> str:
         """A column as an array, for an aggregate."""
         return name if self.model.column(name).is_data else f"kfsheet_out[{self.stored[name]}]"
-
-    # -- what is needed ----------------------------------------------------------------------
-
-    def _reads(self, name: str) -> set[str]:
-        every = {**self.model.derived_scalars, **self.model.summaries}
-        item = every.get(name) or self.model.column(name)
-        symbols = {s.name for rule in item.rules for s in rule.free_symbols}
-        columns = {n for rule in item.rules for n in columns_read(rule)}
-        return columns | (symbols & set(every))
-
-    def _needed(self) -> set[str]:
-        found, todo = set(), [*self.columns, *self.scalars]
-        while todo:
-            name = todo.pop()
-            if name not in found:
-                found.add(name)
-                todo += self._reads(name)
-        return found
 
     def _stored(self) -> dict[str, int]:
         """Row of ``out`` for every column that is wanted, aggregated or read by a later pass."""

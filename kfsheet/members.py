@@ -21,7 +21,7 @@ import numpy as np
 from kfsheet.errors import DataError, ModelError
 from kfsheet.evaluation import can_compile, check_data_name, checked_array, facts_of
 from kfsheet.kernel import Kernel, compiled_function, kernel_of
-from kfsheet.pythoncode import python_source
+from kfsheet.source import python_source
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -167,6 +167,7 @@ def study(
     members: int,
     data: Mapping[str, Any] | Draws | None,
     columns: Sequence[str],
+    scalars: Sequence[str] | None,
     quantiles: Sequence[float],
     nees: Mapping[str, NEES],
     executor: Executor | None,
@@ -184,6 +185,8 @@ def study(
         Data columns: a vector for all members, an array (members, rows), or draws.
     columns : sequence of str
         Columns of which statistics over the members are wanted, step by step.
+    scalars : sequence of str, optional
+        Scalars of which statistics over the members are wanted; all by default.
     quantiles : sequence of float
         Quantiles of the scalars over the members, from 0 to 1.
     nees : mapping of str to NEES
@@ -204,7 +207,11 @@ def study(
     if any(not 0 <= q <= 1 for q in quantiles):
         raise DataError(f"quantiles are {quantiles!r}; each lies between 0 and 1")
     names = [*dict.fromkeys(columns)]
-    task = _first_task(model, members, data, names, nees, parameters)
+    for name in scalars or ():
+        if name not in {**model.derived_scalars, **model.summaries}:
+            raise DataError(f"{model.name} has no scalar {name}")
+    kept = None if scalars is None else tuple(scalars)
+    task = _first_task(model, members, data, names, kept, nees, parameters)
     sums = _computed(task, members, executor)
     return _study(model, members, [*names, *nees], task.kernel.scalars, sums, quantiles)
 
@@ -214,6 +221,7 @@ def _first_task(
     members: int,
     data: Mapping[str, Any] | Draws | None,
     names: list[str],
+    scalars: tuple[str, ...] | None,
     nees: Mapping[str, NEES],
     parameters: Mapping[str, Any],
 ) -> _Task:
@@ -225,7 +233,7 @@ def _first_task(
         needed += [*spec.error_columns(), *spec.covariance_columns(model).values()]
     wanted = tuple(dict.fromkeys(needed))
     facts.wanted(model, wanted)
-    kernel = kernel_of(model, model.version, wanted)
+    kernel = kernel_of(model, model.version, wanted, scalars)
     place = {name: n for n, name in enumerate(kernel.columns)}
     draws = data if isinstance(data, Draws) else None
     series = dict(facts.default)

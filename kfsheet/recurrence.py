@@ -1,7 +1,7 @@
 """The central type: a table of named columns, each defined by one SymPy expression.
 
 A :class:`Recurrence` is written down once and then seen in several ways: as numbers
-(:mod:`kfsheet.evaluation`), as Python source (:mod:`kfsheet.pythoncode`) and as a workbook of live
+(:mod:`kfsheet.evaluation`), as Python source (:mod:`kfsheet.source`) and as a workbook of live
 formulas (:mod:`kfsheet.excel`). A definition looks like the printed equation, with ``t`` for the
 row: ``x_a[t - 1]`` is the analysis one step earlier.
 """

@@ -97,3 +97,19 @@ def _circle(reads: dict[str, set[str]]) -> list[str]:
 def same_row(expression: Basic) -> set[str]:
     """Names of the columns that an expression reads in its own row."""
     return {str(c.base.label) for c in column_references(expression) if lag(c) == 0}
+
+
+def needed(model: Recurrence, names: Iterable[str]) -> set[str]:
+    """Everything that must be computed for some columns and scalars, themselves included."""
+    formulas = {**model.derived_scalars, **model.summaries}
+    found: set[str] = set()
+    todo = list(names)
+    while todo:
+        name = todo.pop()
+        if name in found or name in model.parameters:
+            continue
+        found.add(name)
+        item = formulas.get(name) or model.column(name)
+        for rule in item.rules:
+            todo += columns_read(rule) | {s.name for s in scalars(rule)} & set(formulas)
+    return found

@@ -14,8 +14,8 @@ from kfsheet.excel.layout import FIRST_ROW, Layout
 from kfsheet.expressions import Missing
 from kfsheet.latex import latex_code, latex_name
 from kfsheet.parts import Column
-from kfsheet.pythoncode import python_source
 from kfsheet.recurrence import Recurrence
+from kfsheet.source import python_source
 from kfsheet.units import pretty_unit
 
 if TYPE_CHECKING:
