@@ -6,7 +6,22 @@ import itertools
 from collections.abc import Generator, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from sympy import Add, And, Expr, Indexed, Matrix, Mod, Or, Piecewise, S, expand, pi, zeros
+from sympy import (
+    Abs,
+    Add,
+    And,
+    Expr,
+    Indexed,
+    Matrix,
+    Mod,
+    Or,
+    Piecewise,
+    S,
+    expand,
+    pi,
+    sqrt,
+    zeros,
+)
 
 from kfsheet.checks import ENDLESS
 from kfsheet.expressions import (
@@ -310,7 +325,7 @@ class FilterColumns:
         """The gain, and 0 for an innovation beyond the gate: then neither x nor P moves."""
         if o.gate is None:
             return gain
-        return Piecewise((gain, d**2 <= o.gate**2 * S_o), (S.Zero, True))
+        return Piecewise((gain, Abs(d) <= o.gate * sqrt(S_o)), (S.Zero, True))
 
     @staticmethod
     def guarded(rule: Expr, cells: tuple[Indexed, ...], otherwise: Expr = Missing) -> Expr:

@@ -106,7 +106,7 @@ def newton_step(f: Expr, x: Symbol) -> Expr:
     >>> from sympy import Symbol
     >>> x = Symbol("x")
     >>> newton_step(x**2 - 2, x)
-    (x**2 + 2)/(2*x)
+    x/2 + 1/x
     """
     if f.diff(x) == 0:
         raise ModelError(f"{f} does not depend on {x}, so it has no tangent that meets 0")
