@@ -26,7 +26,8 @@ from kfsheet.recurrence import Recurrence
 from kfsheet.tables import Table, read_table
 
 DATA = Path(__file__).parent / "data"
-AXES = {"x": "ahead", "y": "sideways", "z": "height"}
+AXES = {"x": "distance ahead", "y": "distance sideways", "z": "height"}
+WAYS = {"x": "ahead", "y": "sideways", "z": "upwards"}  # of velocities and accelerations
 NEWTON_STEPS = 8  # enough for weak drag; with the source's numbers five are
 FORECASTS = {
     "raw": "fit to the cameras",
@@ -74,7 +75,7 @@ def _parameters(m: Recurrence) -> None:
     m.parameter("g", 9.80665, "m/s2", "gravity", sign="positive")
     for axis, p, v in (("x", 0, 1.5), ("y", 0, 0.8), ("z", 0.5, 4)):
         m.parameter(f"p_{axis}", p, "m", f"start, {AXES[axis]}")
-        m.parameter(f"v_{axis}", v, "m/s", f"start, velocity {AXES[axis]}")
+        m.parameter(f"v_{axis}", v, "m/s", f"start, velocity {WAYS[axis]}")
     m.parameter("z_fall", 0, "m", "height at which it is to be kicked back")
     m.parameter("SNR", 25, "", "power of the signal over that of the noise", sign="positive")
     m.parameter("q", 0.04, "m2", "Q of the filter, in m2, (m/s)2 and (m/s2)2", sign="nonnegative")
@@ -161,11 +162,11 @@ def _truth(m: Recurrence) -> None:
         g = m["g"] if axis == "z" else 0
         moved = flight(k_step[t], g, dt, X[t]) * Matrix([p[t - 1], v[t - 1], 1])
         m.define(p[t], moved[0], "m", f"truth, {AXES[axis]}", start=[m[f"p_{axis}"]])
-        what = f"truth, velocity {AXES[axis]}"
+        what = f"truth, velocity {WAYS[axis]}"
         m.define(v[t], moved[1], "m/s", what, start=[m[f"v_{axis}"]])
     here, fast = [p[t] for p in position], [v[t] for v in velocity]
     _landing(m, page, "true", here, fast, k=k_eff[t], since=m["time"][t])
-    for name, unit, what in (("t", "s", "time"), ("x", "m", "ahead"), ("y", "m", "sideways")):
+    for name, unit, what in (("t", "s", "time"), ("x", "m", AXES["x"]), ("y", "m", AXES["y"])):
         m.summary(f"{name}_fall", Last(m[f"{name}_fall_true"]), unit, f"truth, fall: {what}")
 
 
@@ -195,8 +196,8 @@ def joint_model(m: Recurrence, axes: str = "xyz") -> StateSpace:
         words = AXES[axis]
         p, v, a = (Symbol(f"{letter}{axis}", real=True) for letter in ("", "v", "a"))
         state[p] = State("m", words, m[f"{axis}_obs"][t], r_obs)
-        state[v] = State("m/s", f"velocity {words}", 0, m["var_v"])
-        state[a] = State("m/s2", f"acceleration {words}", 0, m["var_a"])
+        state[v] = State("m/s", f"velocity {WAYS[axis]}", 0, m["var_v"])
+        state[a] = State("m/s2", f"acceleration {WAYS[axis]}", 0, m["var_a"])
         v_new = v + a * dt
         a_new = -k * v_new - (g if axis == "z" else 0)
         transition += [p + v * dt + a * dt**2 / 2, v_new, a_new.expand()]
@@ -213,7 +214,7 @@ def exact_model(m: Recurrence) -> StateSpace:
         p, v = (Symbol(f"{letter}{axis}", real=True) for letter in ("", "v"))
         variance = m[f"var_{axis}"]
         state[p] = State("m", words, m[f"{axis}_obs"][t], variance)
-        state[v] = State("m/s", f"velocity {words}", 0, m["var_v"])
+        state[v] = State("m/s", f"velocity {WAYS[axis]}", 0, m["var_v"])
         g = m["g"] if axis == "z" else 0
         transition += list(flight(k, g, dt, X) * Matrix([p, v, 1]))
         seen.append(Observation(axis, m[f"{axis}_obs"][t], p, variance, "m", gate=m["gate"]))
@@ -253,10 +254,10 @@ def _fit(m: Recurrence, page: str, run: str, positions: str) -> None:
         )
         cells = (t + 1, m["sum_X"][t], m["sum_XX"][t], S_y, S_Xy)
         at = dict(zip(sums.values(), cells, strict=True))
-        for letter, unit, what in (("p", "m", "start"), ("v", "m/s", "start, velocity")):
+        for letter, unit, what in (("p", "m", words), ("v", "m/s", f"velocity {WAYS[axis]}")):
             (column,) = m.columns(f"{letter}_{axis}_{run}", section=page)
             rule = solution[letter].xreplace(at)
-            m.define(column[t], rule, unit, f"{FORECASTS[run]}: {what} {words}", start=[Missing])
+            m.define(column[t], rule, unit, f"{FORECASTS[run]}: start, {what}", start=[Missing])
             found[letter].append(column[t])
     _landing(m, page, run, found["p"], found["v"], k=m["k_fit"], since=0, start=[Missing])
     _landing_error(m, page, run, start=[Missing])
@@ -310,9 +311,9 @@ ABOUT = (
     "Try this on the sheet Parameters: set e_k to 1 (filters and fits now believe in twice the "
     "drag) or k_2 to 0.2 (quadratic drag in the truth), and Phi_s to 0.5. Or type 15 over one of "
     "the green draws on the sheet Cameras, an outlier, and set gate to 3. When does a filter win?",
-    "Everything is live. The filter was three times three numbers, written as one state of nine: "
-    "covariances between the axes stay 0, so they have no columns. k/m is an assumption: the "
-    "source gives none.",
+    "Everything is live. The filter's state has nine elements, but covariances between the axes "
+    "stay 0, so they have no columns and it is three filters of three. The drag k_m is an "
+    "assumption: the source gives none.",
 )
 SECTIONS = {
     "Truth": "the flight, in exact steps of linear drag, and its fall point",
@@ -332,7 +333,7 @@ def _axis_chart(axis: str, note: str) -> Chart:
         Series("time", f"{axis}_obs", "cameras", "observation"),
         Series("time", f"{axis}_a", "filter", "analysis"),
     )
-    title = f"Position: {AXES[axis]}"
+    title = AXES[axis].capitalize()
     return Chart(title, "time (s)", f"{axis}: {AXES[axis]} (m)", series, note=note)
 
 
