@@ -1,6 +1,8 @@
 """The shuttlecock: filters, fits and fall points, and what its source claims of them."""
 
+import sys
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -23,6 +25,9 @@ from kfsheet.exercises.shuttlecock import (
     track_fit,
 )
 from tests.test_kalman import assert_close, assert_same_filter, joint_filter
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+from shuttlecock_three_by_three import counted, disagreement, operations
 
 T, K, G, N = 1 / 30, 1.0, 9.80665, 27
 P_0, V_0 = np.array([0, 0, 0.5]), np.array([1.5, 0.8, 4.0])
@@ -150,6 +155,18 @@ def test_the_joint_filter_falls_apart_by_itself(frame):
     found = evaluate(alone)
     for column in ("z_a", "vz_a", "az_a", "P_zvz_a", "K_az_z", "d_z"):
         assert (found[f"{column}_alone"][1:] == frame[column][1:]).all()
+
+
+def test_operations_are_counted_as_by_hand():
+    """n = m = 1 on the fingers of both hands; the covariance of n = 3 by the textbook's formula."""
+    assert list(operations(1, 1).values()) == [2, 3, 5, 4, 3]
+    product = 3 * 3 * (3 + 2)
+    assert operations(3, 1)["its covariance, (11)"] == 2 * product + 9
+
+
+def test_nine_by_nine_costs_nine_times_as_much_and_gives_the_same():
+    assert counted().loc["one step", "ratio"] == pytest.approx(9, abs=0.5)
+    assert disagreement() < 1e-12
 
 
 def test_the_third_row_makes_the_acceleration_a_function_of_the_velocity(frame):
