@@ -11,8 +11,6 @@
 # assumption.
 
 # %%
-import sys
-
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
@@ -25,7 +23,6 @@ import kfsheet as kf
 from kfsheet.drag import distorted, fall_argument, fall_asymptote, flight, lambert_step
 from kfsheet.exercises.shuttlecock import FORECASTS, exercise, joint_model, shuttlecock
 
-sys.path.append("../benchmarks")
 init_printing(use_latex="mathjax", latex_printer=lambda e, **_: kf.latex_code(e))
 CHARTS = {chart.title: chart for chart in exercise.charts}
 
@@ -163,6 +160,9 @@ print(len(kept), "of 45:", *kept)
 # the zeros? SymPy counts the operations of one step in full matrices.
 
 # %%
+import sys
+
+sys.path.append("../benchmarks")
 from shuttlecock_three_by_three import counted
 
 counted()
@@ -322,6 +322,7 @@ def bands(flights, kinds, ax):
     ax.legend()
 
 
+# %%
 bands(flights, ["raw", "kf"], plt.subplots(figsize=(8, 4.5), layout="constrained")[1])
 
 # %%
@@ -436,6 +437,7 @@ def outliers(seed):
     return {name: n + 8 * hit * state.standard_normal(27) for name, n in draws(seed).items()}
 
 
+# %%
 worlds = {
     "sound": flights,
     "sound, doubted": fly(Phi_s=0.5),

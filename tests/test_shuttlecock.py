@@ -1,6 +1,7 @@
 """The shuttlecock: filters, fits and fall points, and what its source claims of them."""
 
 import sys
+from functools import partial
 from itertools import product
 from pathlib import Path
 
@@ -253,16 +254,15 @@ def test_without_noise_every_fit_is_the_truth():
 )
 def test_newton_in_cells_finds_the_fall_that_a_bracketing_root_finder_finds(parameters):
     f = evaluate(shuttlecock, **parameters)
-    k = f.attrs["scalars"]["k_fit"]
-    ground = f.attrs["parameters"]["z_fall"]
-    for name in ("raw", "kf"):
-        for row in range(3, N):
-            p, v = (f.loc[row, [f"{s}_{a}_{name}" for a in "xyz"]].to_numpy() for s in "pv")
-            top = max(0.0, np.log1p(k * v[2] / G) / k)
-            fall = brentq(lambda s: track(s, p, v, k)[2] - ground, top, 20, xtol=1e-14)  # noqa: B023
-            assert f.loc[row, f"t_fall_{name}"] == pytest.approx(fall, abs=1e-9)
-            place = f.loc[row, [f"x_fall_{name}", f"y_fall_{name}"]]
-            np.testing.assert_allclose(place, track(fall, p, v, k)[:2], atol=1e-8)
+    k, ground = f.attrs["scalars"]["k_fit"], f.attrs["parameters"]["z_fall"]
+    for name, row in product(("raw", "kf"), range(3, N)):
+        p, v = (f.loc[row, [f"{s}_{a}_{name}" for a in "xyz"]].to_numpy() for s in "pv")
+        top = max(0.0, np.log1p(k * v[2] / G) / k)
+        above = partial(lambda s, p, v: track(s, p, v, k)[2] - ground, p=p, v=v)
+        fall = brentq(above, top, 20, xtol=1e-14)
+        assert f.loc[row, f"t_fall_{name}"] == pytest.approx(fall, abs=1e-9)
+        place = f.loc[row, [f"x_fall_{name}", f"y_fall_{name}"]]
+        np.testing.assert_allclose(place, track(fall, p, v, k)[:2], atol=1e-8)
 
 
 def test_where_a_flight_stays_below_there_is_no_forecast():
