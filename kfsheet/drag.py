@@ -13,6 +13,7 @@ from functools import cache
 from sympy import Expr, Matrix, Symbol, exp, symbols
 
 from kfsheet.algebra import transition_matrix_laplace
+from kfsheet.errors import ModelError
 from kfsheet.fitting import newton_step
 
 
@@ -23,7 +24,13 @@ def distorted(k: Expr, tau: Expr) -> Expr:
     ----------
     k, tau : Expr
         Drag over mass, 1/s, and the time, s.
+
+    Raises
+    ------
+    ModelError
+        If k is 0: without drag, X is the time itself.
     """
+    _check_nonzero("drag over mass k", k)
     return (1 - exp(-k * tau)) / k
 
 
@@ -44,6 +51,11 @@ def flight(k: Expr, g: Expr, tau: Expr, X: Expr) -> Matrix:
     Matrix
         2 x 3; times (p, v, 1) it is the new position and velocity. Derived by Laplace transform.
 
+    Raises
+    ------
+    ModelError
+        If k is 0.
+
     Examples
     --------
     >>> from sympy import symbols
@@ -52,6 +64,7 @@ def flight(k: Expr, g: Expr, tau: Expr, X: Expr) -> Matrix:
     [1,        X, g*(X - tau)/k],
     [0, -X*k + 1,          -X*g]])
     """
+    _check_nonzero("drag over mass k", k)
     solved, given = _flight()
     return solved.xreplace(dict(zip(given, (k, g, tau, X), strict=True)))
 
@@ -73,7 +86,13 @@ def fall_asymptote(k: Expr, g: Expr, drop: Expr, v: Expr) -> Expr:
     ----------
     k, g, drop, v : Expr
         Drag over mass in 1/s, gravity in m/s2, height above the end in m, upward velocity in m/s.
+
+    Raises
+    ------
+    ModelError
+        If g is 0: then nothing falls.
     """
+    _check_nonzero("gravity g", g)
     return 1 + k * v / g + k**2 * drop / g
 
 
@@ -82,7 +101,9 @@ def fall_argument(k: Expr, g: Expr, v: Expr, c: Expr) -> Expr:
 
     W is the principal branch of Lambert's function, W exp(W) = w: of the two moments at that
     height, the one on the way down. Where w < -1/e the flight stays below, and there is none.
+    The arguments and errors are those of :func:`fall_asymptote`, whose result is c.
     """
+    _check_nonzero("gravity g", g)
     return -(1 + k * v / g) * exp(-c)
 
 
@@ -108,3 +129,8 @@ def _lambert() -> tuple[Expr, tuple[Symbol, Symbol]]:
     W, w = symbols("W w", real=True)
     # Height over time is concave, and so is this; W exp(W) - w would overshoot.
     return newton_step(w * exp(-W) - W, W), (W, w)
+
+
+def _check_nonzero(name: str, value: Expr) -> None:
+    if value == 0:
+        raise ModelError(f"{name} is 0, but it divides; give a value above 0")

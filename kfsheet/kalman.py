@@ -86,6 +86,8 @@ class Observation:
 
     def __post_init__(self) -> None:
         _sympify(self, "value", "predicted", "variance", "gate")
+        if self.gate is not None and self.gate.is_nonpositive:
+            raise ModelError(f"the gate of {self.name} is {self.gate}; give a number above 0")
 
 
 @dataclass(frozen=True)

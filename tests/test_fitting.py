@@ -79,6 +79,10 @@ def test_newtons_step_is_a_tangents():
         (lambda: normal_equations(a + b * X**2, [a, b], y, SUMS), r"the sum of X\*\*4"),
         (lambda: least_squares(a + b, [a, b], y, SUMS), "do not determine"),
         (lambda: newton_step(a, b), "does not depend on b"),
+        (lambda: distorted(0, tau), "drag over mass k is 0"),
+        (lambda: flight(0, g, tau, X), "drag over mass k is 0"),
+        (lambda: fall_asymptote(k, 0, p, v), "gravity g is 0"),
+        (lambda: fall_argument(k, 0, v, c), "gravity g is 0"),
     ],
 )
 def test_what_cannot_be_solved_is_refused(call, message):

@@ -418,6 +418,12 @@ def test_a_model_whose_parts_do_not_fit_is_refused(parts, message):
         StateSpace(*parts)
 
 
+@pytest.mark.parametrize("gate", [0, -3])
+def test_a_gate_that_lets_nothing_in_is_refused(gate):
+    with pytest.raises(ModelError, match="the gate of x is"):
+        Observation("x", X, X, 1, "m", gate=gate)
+
+
 def test_names_that_are_taken_are_refused_and_nothing_is_added():
     m = Recurrence("twice", title="Twice")
     cell = m.data("x_a", [1.0, 2.0], "m", "in the way", section="Data")

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from scipy.stats import binom, chi2
 from sympy import Matrix, Symbol, diff, series, symbols
 
-from kfsheet import Recurrence, add_filter, evaluate, t
+from kfsheet import ModelError, Recurrence, add_filter, evaluate, t
 from kfsheet.drag import distorted, flight
 from kfsheet.evaluation import run
 from kfsheet.exercises.shuttlecock import (
@@ -156,6 +156,12 @@ def test_the_joint_filter_falls_apart_by_itself(frame):
     found = evaluate(alone)
     for column in ("z_a", "vz_a", "az_a", "P_zvz_a", "K_az_z", "d_z"):
         assert (found[f"{column}_alone"][1:] == frame[column][1:]).all()
+
+
+@pytest.mark.parametrize("axes", ["", "w", "xyw"])
+def test_an_axis_that_does_not_exist_is_refused(axes):
+    with pytest.raises(ModelError, match="give some of x, y, z"):
+        joint_model(shuttlecock, axes)
 
 
 def test_operations_are_counted_as_by_hand():

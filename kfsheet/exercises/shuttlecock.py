@@ -18,6 +18,7 @@ from sympy import Expr, Matrix, Max, Piecewise, Symbol, diag, exp, sqrt, symbols
 from kfsheet.algebra import discrete_noise
 from kfsheet.charts import Chart, Series
 from kfsheet.drag import distorted, fall_argument, fall_asymptote, flight, lambert_step
+from kfsheet.errors import ModelError
 from kfsheet.exercise import Exercise, Question
 from kfsheet.expressions import RMS, Last, Mean, Missing, t, when_observed
 from kfsheet.fitting import least_squares
@@ -51,7 +52,7 @@ def build_model(draws: str | Path = DATA / "shuttlecock_draws.csv") -> Recurrenc
         If the table is not as described.
     """
     noise = read_table(draws, ("frame", *(f"n_{axis}" for axis in AXES)), times="frame")
-    m = Recurrence("shuttlecock", title="Where will the shuttlecock fall?", step="frame")
+    m = Recurrence("shuttlecock", title="The fall point of a shuttlecock", step="frame")
     _parameters(m)
     _truth(m)
     _cameras(m, noise)
@@ -189,7 +190,21 @@ def joint_model(m: Recurrence, axes: str = "xyz") -> StateSpace:
     """The source's filter, equations (9) to (14): position, velocity, acceleration of each axis.
 
     The acceleration is that of linear drag at the new velocity, and gravity enters there alone.
+
+    Parameters
+    ----------
+    m : Recurrence
+        It has the parameters, and the positions that the cameras saw.
+    axes : str
+        Some of "xyz": three states for each.
+
+    Raises
+    ------
+    ModelError
+        If an axis is none of x, y and z.
     """
+    if not axes or set(axes) - set(AXES):
+        raise ModelError(f"the axes are {axes!r}; give some of {', '.join(AXES)}")
     dt, k, g, q, s_q, r_obs = m["dt", "k_fit", "g", "q", "s_q", "r_obs"]
     state, transition, seen = {}, [], []
     for axis in axes:
