@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Set
+from functools import lru_cache
 from typing import Any
 
 from sympy import (
@@ -83,14 +84,17 @@ def walk(expression: Basic) -> Iterator[Basic]:
             yield from walk(argument)
 
 
-def scalars(expression: Basic) -> set[Symbol]:
+# Every new definition asks these of the definitions before it: hence the memory.
+@lru_cache(maxsize=4096)
+def scalars(expression: Basic) -> frozenset[Symbol]:
     """Symbols that stand for scalars, or for the row index."""
-    return {node for node in walk(expression) if isinstance(node, Symbol)}
+    return frozenset(node for node in walk(expression) if isinstance(node, Symbol))
 
 
-def columns_read(expression: Basic) -> set[str]:
+@lru_cache(maxsize=4096)
+def columns_read(expression: Basic) -> frozenset[str]:
     """Names of the columns that an expression reads, row by row or as a whole."""
-    return {str(base.label) for base in expression.atoms(IndexedBase)}
+    return frozenset(str(base.label) for base in expression.atoms(IndexedBase))
 
 
 def check_symbols(name: str, expression: Expr, known: Set[Basic]) -> None:

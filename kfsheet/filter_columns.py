@@ -6,7 +6,22 @@ import itertools
 from collections.abc import Generator, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from sympy import Add, And, Expr, Indexed, Matrix, Mod, Or, Piecewise, S, expand, pi, zeros
+from sympy import (
+    Abs,
+    Add,
+    And,
+    Expr,
+    Indexed,
+    Matrix,
+    Mod,
+    Or,
+    Piecewise,
+    S,
+    expand,
+    pi,
+    sqrt,
+    zeros,
+)
 
 from kfsheet.checks import ENDLESS
 from kfsheet.expressions import (
@@ -242,7 +257,7 @@ class FilterColumns:
         yield self.column(f"S_{o.name}", variance, unit**2, f"variance of {d.base}")
         K = {i: self.cell(f"K_{self.names[i]}_{o.name}") for i in touched}
         for i in touched:
-            gain = self.guarded(Ph[i] / S_o, asked, S.Zero)
+            gain = self.guarded(self.gated(o, Ph[i] / S_o, d, S_o), asked, S.Zero)
             words = f"gain: {self.names[i]} for one unit of {d.base}"
             yield self.column(f"K_{self.names[i]}_{o.name}", gain, self.units[i] / unit, words)
         yield from self.moved_state(k, K, d, asked)
@@ -304,6 +319,13 @@ class FilterColumns:
             rule = Piecewise((rule, Or(*seen)), (Missing, True))
         words = f"normalised innovation squared; expected: {len(parts)}"
         return self.column("NIS", rule, parse_unit(""), words)
+
+    @staticmethod
+    def gated(o: Observation, gain: Expr, d: Indexed, S_o: Indexed) -> Expr:
+        """The gain, and 0 for an innovation beyond the gate: then neither x nor P moves."""
+        if o.gate is None:
+            return gain
+        return Piecewise((gain, Abs(d) <= o.gate * sqrt(S_o)), (S.Zero, True))
 
     @staticmethod
     def guarded(rule: Expr, cells: tuple[Indexed, ...], otherwise: Expr = Missing) -> Expr:

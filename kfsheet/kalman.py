@@ -72,6 +72,8 @@ class Observation:
         Its unit.
     angle : bool
         Whether the innovation is an angle in rad, to be wrapped to (-pi, pi].
+    gate : Expr, optional
+        Standard deviations; an innovation beyond them is taken for an outlier and gets no weight.
     """
 
     name: str
@@ -80,9 +82,12 @@ class Observation:
     variance: Expr
     unit: str
     angle: bool = False
+    gate: Expr | None = None
 
     def __post_init__(self) -> None:
-        _sympify(self, "value", "predicted", "variance")
+        _sympify(self, "value", "predicted", "variance", "gate")
+        if self.gate is not None and self.gate.is_nonpositive:
+            raise ModelError(f"the gate of {self.name} is {self.gate}; give a number above 0")
 
 
 @dataclass(frozen=True)
@@ -140,7 +145,8 @@ class StateSpace:
 def _sympify(thing: State | Observation, *names: str) -> None:
     """Plain numbers are welcome where formulas are."""
     for name in names:
-        object.__setattr__(thing, name, sympify(getattr(thing, name)))
+        if getattr(thing, name) is not None:
+            object.__setattr__(thing, name, sympify(getattr(thing, name)))
 
 
 def add_filter(m: Recurrence, model: StateSpace, *, section: str, suffix: str = "") -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from sympy import Basic
@@ -94,9 +95,10 @@ def _circle(reads: dict[str, set[str]]) -> list[str]:
         path.append(following)
 
 
-def same_row(expression: Basic) -> set[str]:
+@lru_cache(maxsize=4096)
+def same_row(expression: Basic) -> frozenset[str]:
     """Names of the columns that an expression reads in its own row."""
-    return {str(c.base.label) for c in column_references(expression) if lag(c) == 0}
+    return frozenset(str(c.base.label) for c in column_references(expression) if lag(c) == 0)
 
 
 def needed(model: Recurrence, names: Iterable[str]) -> set[str]:

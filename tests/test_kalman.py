@@ -66,7 +66,7 @@ def assert_same_filter(frame, names, x, P, nis, suffix=""):
     assert_close(frame[f"NIS{suffix}"][1:], nis[1:])
 
 
-def dense(n, m, rows, missing=()):
+def dense(n, m, rows, missing=(), gate=None):
     """A linear model without a single zero, as a recurrence and as arrays."""
     F, H = np.eye(n) + 0.1 * RNG.standard_normal((n, n)), RNG.standard_normal((m, n))
     Q, R = 0.1 * np.eye(n) + 0.01, np.diag(0.5 + RNG.random_sample(m))
@@ -94,7 +94,8 @@ def dense(n, m, rows, missing=()):
         cell = r.data(
             f"y_{k}", ys[:, k], "", "observed", section="Data", may_be_missing=bool(missing)
         )
-        seen.append(Observation(f"y{k}", cell[t], (C * x)[k], number(f"r_{k}", R[k, k]), ""))
+        r_k = number(f"r_{k}", R[k, k])
+        seen.append(Observation(f"y{k}", cell[t], (C * x)[k], r_k, "", gate=gate))
     add_filter(r, StateSpace(state, list(A * x), N, seen), section="Filter")
     arrays = {"F": F, "H": H, "Q": Q, "R": R, "ys": ys}
     return r, [s.name for s in state], arrays
@@ -116,6 +117,30 @@ def test_one_observation_after_the_other_equals_the_joint_update(n, m, missing):
         a["ys"][1:],
     )
     assert_same_filter(evaluate(r), names, x, P, nis)
+
+
+@pytest.mark.parametrize("missing", [(), ((5, 1),)], ids=["all", "gap"])
+def test_a_gate_treats_outliers_as_missing_and_keeps_what_else_was_seen(missing):
+    r, names, a = dense(3, 2, rows=12, missing=missing, gate=8)
+    seen, kept = a["ys"].copy(), a["ys"].copy()
+    for place in ((4, 0), (7, 1), (9, 0), (9, 1)):
+        seen[place], kept[place] = 1000, np.nan
+    x, P, _ = joint_filter(
+        lambda x: a["F"] @ x,
+        lambda x: a["F"],
+        lambda x: a["H"] @ x,
+        lambda x: a["H"],
+        a["Q"],
+        a["R"],
+        np.arange(3.0),
+        np.diag(1.0 + np.arange(3)),
+        kept[1:],
+    )
+    frame = evaluate(r, {"y_0": seen[:, 0], "y_1": seen[:, 1]})
+    assert (frame["NIS"][[4, 7, 9]] > 8**2).all()  # the innovation itself stays to be seen
+    for i, name in enumerate(names):
+        assert_close(frame[f"{name}_a"], x[:, i])
+        assert_close(frame[f"P_{name}{name}_a"], P[:, i, i])
 
 
 def test_long_products_get_columns_of_their_own():
@@ -394,6 +419,12 @@ SEEN = Observation("x", X, X, 1, "m")
 def test_a_model_whose_parts_do_not_fit_is_refused(parts, message):
     with pytest.raises(ModelError, match=message):
         StateSpace(*parts)
+
+
+@pytest.mark.parametrize("gate", [0, -3])
+def test_a_gate_that_lets_nothing_in_is_refused(gate):
+    with pytest.raises(ModelError, match="the gate of x is"):
+        Observation("x", X, X, 1, "m", gate=gate)
 
 
 def test_names_that_are_taken_are_refused_and_nothing_is_added():

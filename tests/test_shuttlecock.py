@@ -1,0 +1,441 @@
+"""The shuttlecock: filters, fits and fall points, and what its source claims of them."""
+
+import sys
+from functools import partial
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.polynomial import polynomial
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+from scipy.stats import binom, chi2
+from sympy import Matrix, Symbol, diff, series, symbols
+
+from kfsheet import ModelError, Recurrence, add_filter, evaluate, t
+from kfsheet.drag import distorted, flight
+from kfsheet.evaluation import run
+from kfsheet.exercises.shuttlecock import (
+    DATA,
+    FORECASTS,
+    build_model,
+    joint_model,
+    shuttlecock,
+    track_fit,
+)
+from tests.test_kalman import assert_close, assert_same_filter, joint_filter
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+from shuttlecock_three_by_three import counted, disagreement, operations
+
+T, K, G, N = 1 / 30, 1.0, 9.80665, 27
+P_0, V_0 = np.array([0, 0, 0.5]), np.array([1.5, 0.8, 4.0])
+TIME = T * np.arange(N)
+DOWN = np.array([0, 0, 1.0])
+NAMES = [f"{letter}{axis}" for axis, letter in product("xyz", ("", "v", "a"))]
+OBSERVED = ["x_obs", "y_obs", "z_obs"]
+
+
+@pytest.fixture(scope="module")
+def frame():
+    return evaluate(shuttlecock)
+
+
+def track(time, p=P_0, v=V_0, k=K):
+    """Equation (6), with v_z0 where it prints v_0."""
+    fading = np.exp(-k * np.asarray(time))[..., None]
+    still = p + v / k + DOWN * (G / k**2 - G * np.asarray(time)[..., None] / k)
+    return still - (v / k + DOWN * G / k**2) * fading
+
+
+def integrated(time, k_2=0.0):
+    """The flight by small steps, linear and quadratic drag; where and when it comes down."""
+
+    def rate(_, state):
+        v = state[3:]
+        return [*v, *(-(K + k_2 * np.linalg.norm(v)) * v - G * DOWN)]
+
+    def ground(_, state):
+        return state[2]
+
+    ground.direction = -1
+    start, exact = [*P_0, *V_0], {"rtol": 1e-10, "atol": 1e-12}
+    path = solve_ivp(rate, (0, 2), start, t_eval=time, events=ground, **exact)
+    return path.y[:3].T, path.t_events[0][0], path.y_events[0][0][:2]
+
+
+def draws(seed):
+    noise = np.random.RandomState(seed).standard_normal((N, 3))
+    return {"n_x": noise[:, 0], "n_y": noise[:, 1], "n_z": noise[:, 2]}
+
+
+def rms(values, axis=None):
+    return np.sqrt(np.mean(np.square(values), axis=axis))
+
+
+# -- the model -----------------------------------------------------------------------------------
+
+
+def test_the_draws_are_what_their_seed_makes():
+    table = pd.read_csv(DATA / "shuttlecock_draws.csv")
+    made = np.random.RandomState(20091219).standard_normal((N, 3)).round(6)
+    assert (table[["n_x", "n_y", "n_z"]].to_numpy() == made).all()
+
+
+def test_units_agree():
+    assert shuttlecock.check_units() == []
+
+
+def test_the_truth_is_equation_6(frame):
+    np.testing.assert_allclose(frame[["x_true", "y_true", "z_true"]], track(TIME), atol=1e-14)
+
+
+@pytest.mark.parametrize("k_2", [0, 0.1, 0.4])
+def test_the_truth_is_what_small_steps_add_up_to(k_2):
+    """Quadratic drag, stepped as linear drag of the same force, is right within 4 mm."""
+    f = evaluate(shuttlecock, k_2=k_2)
+    path, moment, place = integrated(TIME, k_2)
+    tolerance = 0.004 if k_2 else 1e-8
+    np.testing.assert_allclose(f[["x_true", "y_true", "z_true"]], path, atol=tolerance)
+    found = [f.attrs["scalars"][name] for name in ("x_fall", "y_fall", "t_fall")]
+    np.testing.assert_allclose(found, [*place, moment], atol=tolerance)
+
+
+def test_snr_25_and_r_004_are_one_statement(frame):
+    """A noise of 1/25 of the signal's power is 0.04 if that power is 1; here it is not."""
+    for axis in "xyz":
+        power = np.mean(frame[f"{axis}_true"] ** 2)
+        noise = frame[f"{axis}_obs"] - frame[f"{axis}_true"]
+        variance = frame.attrs["scalars"][f"var_{axis}"]
+        assert variance == pytest.approx(power / 25)
+        np.testing.assert_allclose(noise, np.sqrt(power / 25) * frame_draws(axis), atol=1e-14)
+        assert variance / power == pytest.approx(shuttlecock.parameters["r_obs"].value)
+        assert variance < 0.04
+
+
+def frame_draws(axis):
+    return pd.read_csv(DATA / "shuttlecock_draws.csv")[f"n_{axis}"]
+
+
+# -- the filter ----------------------------------------------------------------------------------
+
+
+def nine_by_nine(frame, k=K):
+    """Equations (10) to (14) of all three axes at once, with a matrix inverse."""
+    A = np.kron(np.eye(3), [[1, T, T**2 / 2], [0, 1, T], [0, -k, -k * T]])
+    fall = np.array([0] * 8 + [-G])
+    H = np.kron(np.eye(3), [1.0, 0, 0])
+    ys = frame[OBSERVED].to_numpy()
+    return joint_filter(
+        lambda x: A @ x + fall,
+        lambda x: A,
+        lambda x: H @ x,
+        lambda x: H,
+        0.04 * np.eye(9),
+        0.04 * np.eye(3),
+        np.kron(ys[0], [1.0, 0, 0]),
+        np.kron(np.eye(3), np.diag([0.04, 25, 25])),
+        ys[1:],
+    )
+
+
+def test_three_small_filters_equal_the_joint_one(frame):
+    assert_same_filter(frame, NAMES, *nine_by_nine(frame))
+
+
+def test_the_joint_filter_falls_apart_by_itself(frame):
+    """Nine states have 45 covariances; 27 of them relate two axes, stay 0 and get no column."""
+    kept = [c for c in shuttlecock.table if c.startswith("P_") and c.endswith("_f")]
+    assert len(kept) == 3 * 6
+    _, P, _ = nine_by_nine(frame)
+    assert not P[:, :3, 3:].any()
+    alone = build_model()
+    add_filter(alone, joint_model(alone, "z"), section="Alone", suffix="_alone")
+    found = evaluate(alone)
+    for column in ("z_a", "vz_a", "az_a", "P_zvz_a", "K_az_z", "d_z"):
+        assert (found[f"{column}_alone"][1:] == frame[column][1:]).all()
+
+
+@pytest.mark.parametrize("axes", ["", "w", "xyw"])
+def test_an_axis_that_does_not_exist_is_refused(axes):
+    with pytest.raises(ModelError, match="give some of x, y, z"):
+        joint_model(shuttlecock, axes)
+
+
+def test_operations_are_counted_as_by_hand():
+    """n = m = 1 on the fingers of both hands; the covariance of n = 3 by the textbook's formula."""
+    assert list(operations(1, 1).values()) == [2, 3, 5, 4, 3]
+    product = 3 * 3 * (3 + 2)
+    assert operations(3, 1)["its covariance, (11)"] == 2 * product + 9
+
+
+def test_nine_by_nine_costs_nine_times_as_much_and_gives_the_same():
+    assert counted().loc["one step", "ratio"] == pytest.approx(9, abs=0.5)
+    assert disagreement() < 1e-12
+
+
+def test_the_third_row_makes_the_acceleration_a_function_of_the_velocity(frame):
+    after = frame[1:]
+    np.testing.assert_allclose(after["az_f"], -K * after["vz_f"] - G)
+    np.testing.assert_allclose(after["ax_f"], -K * after["vx_f"], atol=1e-14)
+
+
+def test_A_errs_by_T_cubed_in_position_and_T_squared_in_velocity():
+    """On a state that obeys the drag law, against the exact transition."""
+    step, k, v, p = symbols("T k v p", positive=True)
+    A = Matrix([[1, step, step**2 / 2], [0, 1, step], [0, -k, -k * step]])
+    exact = flight(k, 0, step, distorted(k, step)) * Matrix([p, v, 1])
+    error = A * Matrix([p, v, -k * v]) - Matrix([*exact, -k * exact[1]])
+    orders = [series(e, step, 0, 5).removeO().as_poly(step).monoms()[-1][0] for e in error]
+    assert orders == [3, 2, 2]
+    assert A.rank() == 2
+
+
+def test_gravity_enters_through_the_acceleration_alone():
+    """B is never printed; (0, 0, 1) follows from the model, (T^2/2, T, 1) counts gravity twice."""
+    model = joint_model(shuttlecock, "z")
+    g = shuttlecock["g"]
+    B = Matrix([diff(e, g) / -1 for e in model.transition])
+    assert Matrix([0, 0, 1]) == B
+    at = {Symbol("z", real=True): 0.5, Symbol("vz", real=True): 4, Symbol("az", real=True): -4 - G}
+    scalars = evaluate(shuttlecock).attrs
+    values = {**scalars["parameters"], **scalars["scalars"]}
+    position, velocity, _ = (
+        float(e.subs({shuttlecock["dt"]: values["dt"], shuttlecock["k_fit"]: 1, g: G}).subs(at))
+        for e in model.transition
+    )
+    exact = track([T, T + 1e-6])[:, 2]
+    assert position == pytest.approx(exact[0], abs=1e-4)
+    true_velocity = (exact[1] - exact[0]) / 1e-6
+    assert velocity == pytest.approx(true_velocity, abs=0.01)
+    assert abs(velocity - T * G - true_velocity) > 0.3
+
+
+def test_the_printed_position_lacks_a_factor_T():
+    """Equation (9): x(i-1) + x'(i-1) adds metres and metres per second."""
+    m = Recurrence("printed", title="As printed", rows=3)
+    dt = m.parameter("dt", 1 / 30, "s", "time between two frames")
+    x, v = m.columns("x", "v", section="Printed")
+    v_0 = m.parameter("v_0", 1, "m/s", "velocity at the start")
+    m.define(v[t], v[t - 1], "m/s", "velocity", start=[v_0])
+    m.define(x[t], x[t - 1] + v[t - 1] + v[t] * dt, "m", "position", start=[0])
+    (problem,) = m.check_units()
+    assert problem.name == "x"
+    assert "m/s" in problem.reason
+
+
+def test_the_printed_height_starts_with_another_velocity():
+    """Equation (6) prints v_0, the speed, in the height; only v_z0 starts as it should."""
+    f = evaluate(shuttlecock)
+    printed = track(TIME, v=np.array([*V_0[:2], np.linalg.norm(V_0)]))[:, 2]
+    started = (f["z_true"][1] - f["z_true"][0]) / T
+    assert started == pytest.approx(4 - (4 + G) * T / 2, abs=0.01)
+    assert (printed[1] - printed[0]) / T > started + 0.3
+
+
+# -- fits and fall points ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("name", "seen"), [("raw", "obs"), ("kf", "a")])
+def test_running_sums_are_a_fit_to_all_frames_so_far(frame, name, seen):
+    X = (1 - np.exp(-K * TIME)) / K
+    y = frame[[f"{axis}_{seen}" for axis in "xyz"]].to_numpy() - np.outer(G * (X - TIME) / K, DOWN)
+    for last in range(1, N):
+        p, v = polynomial.polyfit(X[: last + 1], y[: last + 1], 1)
+        assert_close(frame.loc[last, [f"p_{axis}_{name}" for axis in "xyz"]], p, 1e-8)
+        assert_close(frame.loc[last, [f"v_{axis}_{name}" for axis in "xyz"]], v, 1e-8)
+
+
+def test_without_noise_every_fit_is_the_truth():
+    f = evaluate(shuttlecock, {name: np.zeros(N) for name in ("n_x", "n_y", "n_z")})
+    np.testing.assert_allclose(f[["p_x_raw", "p_y_raw", "p_z_raw"]][1:], [P_0] * 26, atol=1e-12)
+    np.testing.assert_allclose(f[["v_x_raw", "v_y_raw", "v_z_raw"]][1:], [V_0] * 26, atol=1e-11)
+    assert f["e_fall_raw"].max() < 1e-11
+
+
+@pytest.mark.parametrize(
+    "parameters", [{}, {"k_m": 0.2}, {"e_k": 1}, {"z_fall": -2}, {"k_2": 0.4}], ids=str
+)
+def test_newton_in_cells_finds_the_fall_that_a_bracketing_root_finder_finds(parameters):
+    f = evaluate(shuttlecock, **parameters)
+    k, ground = f.attrs["scalars"]["k_fit"], f.attrs["parameters"]["z_fall"]
+    for name, row in product(("raw", "kf"), range(3, N)):
+        p, v = (f.loc[row, [f"{s}_{a}_{name}" for a in "xyz"]].to_numpy() for s in "pv")
+        top = max(0.0, np.log1p(k * v[2] / G) / k)
+        above = partial(lambda s, p, v: track(s, p, v, k)[2] - ground, p=p, v=v)
+        fall = brentq(above, top, 20, xtol=1e-14)
+        assert f.loc[row, f"t_fall_{name}"] == pytest.approx(fall, abs=1e-9)
+        place = f.loc[row, [f"x_fall_{name}", f"y_fall_{name}"]]
+        np.testing.assert_allclose(place, track(fall, p, v, k)[:2], atol=1e-8)
+
+
+def test_where_a_flight_stays_below_there_is_no_forecast():
+    f = evaluate(shuttlecock, z_fall=3)
+    top = track(np.log1p(4 / G))[2]
+    assert top < 3
+    assert f["t_fall_raw"][5:].isna().all()
+    assert f["e_fall_kf"][5:].isna().all()
+    assert f["t_fall_true"].notna().all()
+
+
+def test_an_exact_filter_without_prior_knowledge_is_the_fit():
+    """Recursive least squares: the same numbers by two roads, frame by frame."""
+    f = evaluate(shuttlecock, var_v=1e9)
+    both = f[["x_fall_ex", "x_fall_raw", "y_fall_ex", "y_fall_raw", "t_fall_ex", "t_fall_raw"]][2:]
+    np.testing.assert_allclose(both.to_numpy()[:, ::2], both.to_numpy()[:, 1::2], atol=1e-5)
+
+
+def exact_filter(frame, Phi_s, var_v, ys):
+    X = (1 - np.exp(-K * T)) / K
+    F = np.kron(np.eye(3), [[1, X], [0, 1 - K * X]])
+    fall = np.array([0, 0, 0, 0, G * (X - T) / K, -G * X])
+    Q = Phi_s * np.kron(np.eye(3), [[T**3 / 3, T**2 / 2], [T**2 / 2, T]])
+    H = np.kron(np.eye(3), [1.0, 0])
+    variance = [frame.attrs["scalars"][f"var_{axis}"] for axis in "xyz"]
+    start = np.diag(np.ravel([(r, var_v) for r in variance]))
+    return joint_filter(
+        lambda x: F @ x + fall,
+        lambda x: F,
+        lambda x: H @ x,
+        lambda x: H,
+        Q,
+        np.diag(variance),
+        np.kron(ys[0], [1.0, 0]),
+        start,
+        ys[1:],
+    )
+
+
+def test_the_exact_filter_equals_the_joint_update():
+    f = evaluate(shuttlecock, Phi_s=0.7, var_v=9)
+    found = exact_filter(f, 0.7, 9, f[OBSERVED].to_numpy())
+    assert_same_filter(f, ["x", "vx", "y", "vy", "z", "vz"], *found, suffix="_ex")
+
+
+def test_the_gate_treats_an_outlier_as_a_missing_frame():
+    wild = {name: frame_draws(name[-1]).to_numpy(copy=True) for name in ("n_x", "n_y", "n_z")}
+    wild["n_x"][12] = 15
+    f = evaluate(shuttlecock, wild, gate=4)
+    ys = f[OBSERVED].to_numpy(copy=True)
+    ys[12, 0] = np.nan
+    x, P, _ = exact_filter(f, 0, 25, ys)
+    for i, name in enumerate(["x", "vx", "y", "vy", "z", "vz"]):
+        assert_close(f[f"{name}_a_ex"], x[:, i])
+    assert_close(f["P_xx_a_ex"], P[:, 0, 0])
+    assert (f.loc[f["K_x_x_ex"] == 0].index == [12]).all()
+
+
+# -- many flights: what the source claims --------------------------------------------------------
+
+RUNS = 200
+AFTER = [6, 10, 14, 18, 22, 26]
+
+
+def fly(data=draws, **parameters):
+    """Errors of fall points, runs x frames, of each forecast; and those of positions."""
+    columns = [run(shuttlecock, data(seed), parameters)[0] for seed in range(RUNS)]
+    names = [
+        *(f"e_fall_{r}" for r in FORECASTS),
+        *(f"e_{a}_{r}" for a in "xyz" for r in ("obs", "a")),
+    ]
+    return {name: np.array([c[name] for c in columns]) for name in names}
+
+
+def outliers(seed):
+    """One frame of ten, on average, errs by 8 standard deviations more, on every axis."""
+    state = np.random.RandomState(10_000 + seed)
+    hit = state.random_sample(N) < 0.1
+    return {name: n + 8 * hit * state.standard_normal(N) for name, n in draws(seed).items()}
+
+
+@pytest.fixture(scope="module")
+def flights():
+    return {
+        "sound": fly(),
+        "twice the drag": fly(e_k=1, Phi_s=0.5),
+        "quadratic": fly(k_2=0.1),
+        "outliers": fly(outliers, gate=3),
+    }
+
+
+def middle(errors, frames=AFTER):
+    return np.median(errors[:, frames], axis=0)
+
+
+def test_claim_1_holds_positions_are_better_filtered(flights):
+    """Over 400 runs a reference gave 0.111, 0.060, 0.172 m and 0.079, 0.043, 0.125 m."""
+    for axis, raw, filtered in (("x", 0.111, 0.079), ("y", 0.060, 0.043), ("z", 0.172, 0.125)):
+        assert rms(flights["sound"][f"e_{axis}_obs"]) == pytest.approx(raw, rel=0.03)
+        assert rms(flights["sound"][f"e_{axis}_a"]) == pytest.approx(filtered, rel=0.05)
+
+
+def test_claim_2_does_not_hold_fall_points_are_no_better_from_filtered_positions(flights):
+    """The reference's medians; those of 200 runs scatter by 4 % themselves, as its own do."""
+    raw, kf = middle(flights["sound"]["e_fall_raw"]), middle(flights["sound"]["e_fall_kf"])
+    np.testing.assert_allclose(raw, [0.366, 0.164, 0.092, 0.068, 0.045, 0.035], rtol=0.2)
+    np.testing.assert_allclose(kf, [0.381, 0.177, 0.094, 0.069, 0.046, 0.036], rtol=0.2)
+    assert (kf > raw).all()
+    pairs = flights["sound"]["e_fall_kf"][:, AFTER] < flights["sound"]["e_fall_raw"][:, AFTER]
+    assert (pairs.sum(axis=0) < binom.ppf(0.999, RUNS, 0.5)).all()
+
+
+def test_the_fit_to_raw_positions_errs_as_theory_says(flights):
+    """Gauss and Markov: variance of the fall point from that of the fit, to first order."""
+    X = (1 - np.exp(-TIME)) / K
+    sigma = rms(track(TIME), axis=0) / 5
+    end = brentq(lambda s: track(s)[2], 0.5, 2)
+    X_end, falling = 1 - np.exp(-end), (V_0[2] + G) * np.exp(-end) - G
+    for last in (18, 22, 26):
+        design = np.column_stack([np.ones(last + 1), X[: last + 1]])
+        spread = np.array([1, X_end]) @ np.linalg.inv(design.T @ design) @ np.array([1, X_end])
+        late = spread * sigma[2] ** 2 / falling**2  # variance of the time of the fall
+        drift = V_0[:2] * np.exp(-end)
+        expected = spread * (sigma[:2] ** 2).sum() + late * (drift**2).sum()
+        found = np.mean(flights["sound"]["e_fall_raw"][:, last] ** 2)
+        assert found == pytest.approx(expected, rel=4 * np.sqrt(2 / RUNS))
+
+
+def test_a_filter_wins_while_there_are_few_frames(flights):
+    """It knows that velocities are of some metres per second; a line through three points not."""
+    sound = flights["sound"]
+    assert middle(sound["e_fall_ex"], [2]) < 0.9 * middle(sound["e_fall_raw"], [2])
+    assert middle(sound["e_fall_now"], [2]) < 0.8 * middle(sound["e_fall_raw"], [2])
+
+
+def test_the_latest_state_of_the_three_state_filter_forgets(flights):
+    sound = flights["sound"]
+    assert middle(sound["e_fall_now"], [26]) > 1.5 * middle(sound["e_fall_raw"], [26])
+
+
+def test_a_filter_wins_against_outliers_because_it_can_refuse_them(flights):
+    wild = flights["outliers"]
+    later = AFTER[2:]
+    assert (middle(wild["e_fall_ex"], later) < 0.75 * middle(wild["e_fall_raw"], later)).all()
+    assert (middle(wild["e_fall_kf"]) > 0.95 * middle(wild["e_fall_raw"])).all()
+
+
+def test_a_filter_that_doubts_its_model_wins_if_the_model_is_wrong_enough(flights):
+    twice = flights["twice the drag"]
+    assert middle(twice["e_fall_ex"], [26]) < 0.85 * middle(twice["e_fall_raw"], [26])
+    quadratic = flights["quadratic"]
+    ratio = middle(quadratic["e_fall_ex"]) / middle(quadratic["e_fall_raw"])
+    assert np.abs(ratio - 1).max() < 0.1
+
+
+def test_r_004_makes_the_filter_modest():
+    """NIS far below 3: R claims more noise than there is; the exact filter claims what there is."""
+    found = [run(shuttlecock, draws(seed))[1] for seed in range(40)]
+    low, high = chi2.interval(0.999, 3 * 26 * 40)
+    exact = np.mean([s["mean_NIS_ex"] for s in found]) * 26 * 40
+    assert low < exact < high
+    assert np.mean([s["mean_NIS"] for s in found]) < 1.5
+
+
+def test_the_sums_of_the_fit_are_those_of_the_normal_equations():
+    solution, sums = track_fit()
+    X, y = np.array([0.0, 1, 2, 4]), np.array([1.0, 3, 4, 9])
+    at = dict(zip(sums.values(), (4, X.sum(), X @ X, y.sum(), X @ y), strict=True))
+    found = [float(solution[letter].subs(at)) for letter in "pv"]
+    np.testing.assert_allclose(found, np.linalg.lstsq(np.vander(X, 2)[:, ::-1], y)[0])
