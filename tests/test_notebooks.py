@@ -11,7 +11,7 @@ sys.path.insert(0, str(ROOT / "tools"))
 from execute_notebooks import unexecuted  # noqa: E402 - from tools/, which is no package
 
 SOURCES = sorted((ROOT / "notebooks").glob("*.py"))
-LEAST_COMPARED = 20
+LEAST_COMPARED = 10
 NOT_COMPARED = {"image/png", "text/latex"}
 
 
