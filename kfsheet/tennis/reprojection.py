@@ -51,8 +51,8 @@ class _Unknowns:
 
     @property
     def blocks(self) -> dict[str, int]:
-        sizes = {"X": 3, "V": 3, "kappa": self.kappa is None, "spin": SPINS[self.spin]}
-        return {name: n for name, n in {**sizes, "g": self.g is None}.items() if n}
+        sizes = {"X": 3, "V": 3, "kappa": int(self.kappa is None), "spin": SPINS[self.spin]}
+        return {name: n for name, n in {**sizes, "g": int(self.g is None)}.items() if n}
 
     def vector(self, ball: Ball) -> Array:
         values = {"X": ball.X, "V": ball.V, "kappa": ball.kappa, "g": ball.g, "spin": 0.0}
