@@ -24,7 +24,7 @@ _HOMES = {
     "kfsheet.exercises": "exercise_names load_exercise",
     "kfsheet.expressions": "Count Largest Last Mean Missing Observed RMS Smallest Std Sum "
     "SumProduct t when_observed",
-    "kfsheet.kalman": "Observation State StateSpace add_filter",
+    "kfsheet.kalman": "Intermediate Observation State StateSpace add_filter",
     "kfsheet.latex": "latex_code",
     "kfsheet.plots": "draw",
     "kfsheet.pythoncode": "python_code python_source",

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Generator, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from sympy import Add, And, Expr, Indexed, Matrix, Mod, Or, Piecewise, S, expand, pi, zeros
+from sympy import Add, And, Expr, Indexed, Matrix, Mod, Or, Piecewise, S, Symbol, expand, pi, zeros
 
 from kfsheet.checks import ENDLESS
 from kfsheet.expressions import (
@@ -106,9 +106,16 @@ class FilterColumns:
 
         return Matrix(len(self.all), len(self.all), entry)
 
+    @property
+    def changing(self) -> set[Symbol]:
+        """Symbols whose values differ from row to row."""
+        return {*self.model.state, *self.model.intermediates}
+
     def at(self, expression: Expr, cells: Sequence[Expr]) -> Expr:
-        """An expression in the symbols of the state, with cells in their place."""
-        return expression.xreplace(dict(zip(self.model.state, cells, strict=True)))
+        """An expression in symbols of the state and intermediates, with cells in their place."""
+        known = dict(zip(self.model.state, cells, strict=True))
+        known |= {w: self.cell(w.name) for w in self.model.intermediates}
+        return expression.xreplace(known)
 
     def gaps(self, expression: Expr) -> tuple[Indexed, ...]:
         """Cells in an expression that may be missing from row 1 on."""
@@ -134,7 +141,7 @@ class FilterColumns:
         self, name: str, entry: Expr, cells: Sequence[Expr], unit: Any, words: str
     ) -> Generator[Definition, None, Expr]:
         """An entry of a Jacobian: a constant stays where it is used, others get a column."""
-        if not entry.free_symbols & set(self.model.state):
+        if not entry.free_symbols & self.changing and not column_references(entry):
             return entry
         yield self.column(name, self.at(entry, cells), unit, words)
         return self.cell(name)
@@ -144,15 +151,16 @@ class FilterColumns:
     def forecast(self) -> Iterator[Definition]:
         """x_f = f(x_a) and P_f = F P_a F' + Q."""
         x_a = [self.cell(f"{name}_a", back=1) for name in self.names]
+        slopes: dict[Symbol, list[Expr]] = {}
+        for w, item in self.model.intermediates.items():
+            unit = parse_unit(item.unit)
+            yield self.column(w.name, self.at(item.value, x_a), unit, item.description)
+            slopes[w] = yield from self.slopes(f"D_{w}", w.name, item.value, unit, x_a, slopes)
         F = zeros(len(self.all), len(self.all))
-        for i, j in itertools.product(self.all, repeat=2):
-            to, of = self.names[i], self.names[j]
-            F[i, j] = yield from self.derivative(
-                f"F_{to}_{of}",
-                self.model.F[i, j],
-                x_a,
-                self.units[i] / self.units[j],
-                f"derivative of the next {to} with respect to {of}",
+        for i, rule in enumerate(self.model.transition):
+            to, unit = self.names[i], self.units[i]
+            F[i, :] = Matrix(
+                [(yield from self.slopes(f"F_{to}", f"the next {to}", rule, unit, x_a, slopes))]
             )
         for name, element, unit, rule in zip(
             self.names, self.elements, self.units, self.model.transition, strict=True
@@ -160,6 +168,26 @@ class FilterColumns:
             words = f"forecast: {element.description}"
             yield self.column(f"{name}_f", self.at(rule, x_a), unit, words, element.start)
         yield from self.forecast_covariance(F, self.model.Q.applyfunc(lambda e: self.at(e, x_a)))
+
+    def slopes(
+        self,
+        name: str,
+        what: str,
+        value: Expr,
+        unit: Any,
+        x_a: Sequence[Expr],
+        known: dict[Symbol, list[Expr]],
+    ) -> Generator[Definition, None, list[Expr]]:
+        """Derivatives of a value with respect to the state, by the chain rule."""
+        found = []
+        for j, symbol in enumerate(self.model.state):
+            inner = Add(*(value.diff(w) * slope[j] for w, slope in known.items()))
+            words = f"derivative of {what} with respect to {symbol}"
+            slope = yield from self.derivative(
+                f"{name}_{symbol}", value.diff(symbol) + inner, x_a, unit / self.units[j], words
+            )
+            found.append(slope)
+        return found
 
     def forecast_covariance(self, F: Matrix, Q: Matrix) -> Iterator[Definition]:
         """P_f = F P_a F' + Q, the upper triangle."""
