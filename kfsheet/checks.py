@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Set
+from functools import lru_cache
 from typing import Any
 
 from sympy import (
@@ -25,6 +26,7 @@ from kfsheet.pythoncode import python_code
 
 LARGEST_NUMBER, LARGEST_DENOMINATOR = 12, 16
 FULL_CIRCLE = {60, 90, 180, 360}
+REMEMBERED = 4096  # expressions whose parts are asked for again and again by schedule()
 ENDLESS = 1_048_576  # more rows than a worksheet has
 
 
@@ -83,14 +85,16 @@ def walk(expression: Basic) -> Iterator[Basic]:
             yield from walk(argument)
 
 
-def scalars(expression: Basic) -> set[Symbol]:
+@lru_cache(maxsize=REMEMBERED)
+def scalars(expression: Basic) -> frozenset[Symbol]:
     """Symbols that stand for scalars, or for the row index."""
-    return {node for node in walk(expression) if isinstance(node, Symbol)}
+    return frozenset(node for node in walk(expression) if isinstance(node, Symbol))
 
 
-def columns_read(expression: Basic) -> set[str]:
+@lru_cache(maxsize=REMEMBERED)
+def columns_read(expression: Basic) -> frozenset[str]:
     """Names of the columns that an expression reads, row by row or as a whole."""
-    return {str(base.label) for base in expression.atoms(IndexedBase)}
+    return frozenset(str(base.label) for base in expression.atoms(IndexedBase))
 
 
 def check_symbols(name: str, expression: Expr, known: Set[Basic]) -> None:

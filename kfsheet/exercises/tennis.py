@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sympy import Expr, Matrix, Min, Symbol, diag, sqrt, zeros
+from sympy import Expr, Matrix, Min, S, Symbol, diag, floor, sqrt, zeros
 
 from kfsheet.charts import Chart, Series
 from kfsheet.exercise import Exercise, Question
@@ -161,23 +161,36 @@ def _start(m: Recurrence) -> None:
     The slope through points at even times is the velocity at their middle; drag, spin and gravity
     at that velocity bend the parabola.
     """
-    (when,) = m.columns("time_tri", section="Triangulation")
+    when, off = m.columns("time_tri", "time_off", section="Triangulation")
     seen = when_observed(m["x1_tri"][t], m.clock.base[t])
     m.define(when[t], seen, "s", "time of the image, where both cameras have it")
     n = m.summary("n_tri", Count(when), "", "images that both cameras have")
     t_m = m.summary("t_mid", Mean(when), "s", "middle of their times")
-    spread = m.summary("t_var", SumProduct(when, when) / n - t_m**2, "s2", "variance of them")
+    # Times since the middle: sums of products of times since 0 would cancel, and lose digits.
+    m.define(off[t], when_observed(when[t], when[t] - t_m), "s", "time since the middle of those")
+    spread = m.summary("t_var", SumProduct(off, off) / n, "s2", "variance of those times")
     middle, slope = [], []
     for k in AXES:
         x = m[f"x{k}_tri"]
         middle.append(m.summary(f"x{k}_mid", Mean(x), "m", f"mean of x{k}_tri"))
-        rule = (SumProduct(when, x) / n - t_m * middle[-1]) / spread
+        # The times since the middle sum up to rounding errors only; they must not meet 5 m.
+        rule = (SumProduct(off, x) - Sum(off) * middle[-1]) / (n * spread)
         slope.append(m.summary(f"v{k}_mid", rule, "m/s", f"slope of x{k}_tri"))
     for k, bend in zip(AXES, _push(m, slope, _length(slope)), strict=True):
         a = m.summary(f"a{k}_mid", bend, "m/s2", f"acceleration {k} at that velocity")
         level = middle[k - 1] - slope[k - 1] * t_m + a * (t_m**2 - spread) / 2
-        m.summary(f"x{k}_0", level, "m", f"start, x{k}")
-        m.summary(f"v{k}_0", slope[k - 1] - a * t_m, "m/s", f"start, velocity {k}")
+        m.summary(f"x{k}_0", _rounded(level, m["s_x"]), "m", f"start, x{k}")
+        speed = _rounded(slope[k - 1] - a * t_m, m["s_v"])
+        m.summary(f"v{k}_0", speed, "m/s", f"start, velocity {k}")
+
+
+def _rounded(value: Expr, error: Expr) -> Expr:
+    """To a tenth of the error that is claimed: it claims no more.
+
+    Programs add in different orders. Rounded, the start is the same in all of them to the last
+    digit, which an innovation, a small difference of large pixels, would otherwise magnify.
+    """
+    return floor(10 * value / error + S.Half) * error / 10
 
 
 def flight_model(m: Recurrence) -> StateSpace:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ from kfsheet.tennis.inputs import Array, array, number
 
 PIXELS, ANGLE = 500, 0.42
 """Resolution R in px and visibility angle alpha in rad of the report's camera."""
-FOCAL_LENGTH = PIXELS / 2 / np.tan(ANGLE / 2)
+FOCAL_LENGTH = PIXELS / 2 / math.tan(ANGLE / 2)
 """Of an ideal pinhole that sees ``ANGLE`` on ``PIXELS``, px."""
 
 
