@@ -8,11 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 from kfsheet.errors import DataError
 from kfsheet.tennis.dynamics import GRAVITY, MASS, TEXTBOOK_DRAG, Ball, flights
-from kfsheet.tennis.inputs import Array
+from kfsheet.tennis.inputs import Array, array
 from kfsheet.tennis.shots import Shot
 
 SPINS = {"none": 0, "across": 2, "full": 3}
@@ -46,12 +47,13 @@ class _Unknowns:
     """The vector of the optimiser: X, V, then kappa, spin and g as far as they are free."""
 
     kappa: float | None
-    spin: str
+    spin: str | Array
     g: float | None
 
     @property
     def blocks(self) -> dict[str, int]:
-        sizes = {"X": 3, "V": 3, "kappa": int(self.kappa is None), "spin": SPINS[self.spin]}
+        free_spin = SPINS[self.spin] if isinstance(self.spin, str) else 0
+        sizes = {"X": 3, "V": 3, "kappa": int(self.kappa is None), "spin": free_spin}
         return {name: n for name, n in {**sizes, "g": int(self.g is None)}.items() if n}
 
     def vector(self, ball: Ball) -> Array:
@@ -74,10 +76,14 @@ class _Unknowns:
             free[name][:, 0] if name in free else np.full(len(vectors), known[name])
             for name in ("kappa", "g")
         )
-        spin = free.get("spin", np.zeros((len(vectors), 3)))
-        if self.spin == "across":
-            spin = _across(free["V"], spin)
-        return free["X"], free["V"], kappa, spin, g
+        return free["X"], free["V"], kappa, self.spins(free), g
+
+    def spins(self, free: dict[str, Array]) -> Array:
+        """Lambda (n, 3) for each vector."""
+        if "spin" not in free:
+            known = np.zeros(3) if isinstance(self.spin, str) else self.spin
+            return np.broadcast_to(known, free["V"].shape)
+        return _across(free["V"], free["spin"]) if self.spin == "across" else free["spin"]
 
     def ball(self, vector: Array) -> Ball:
         X, V, kappa, spin, g = self.balls(vector[None])
@@ -113,7 +119,7 @@ def fit_pixels(
     shot: Shot,
     *,
     kappa: float | None = None,
-    spin: str = "full",
+    spin: str | ArrayLike = "full",
     g: float | None = GRAVITY,
     start: Ball | None = None,
 ) -> Fit:
@@ -125,8 +131,9 @@ def fit_pixels(
         The photos; missing ones are left out.
     kappa, g : float, optional
         Known drag c_D/m and gravity; None leaves them free.
-    spin : {'full', 'across', 'none'}
-        Which components of the spin are free: all, the two across V, none.
+    spin : {'full', 'across', 'none'} or array_like
+        Which components of the spin are free: all, the two across V, none of a ball that has no
+        spin; or the known spin lambda = c_L Omega/m, (3,).
     start : Ball, optional
         Where to begin; by default a parabola through the triangulated points.
 
@@ -135,8 +142,9 @@ def fit_pixels(
     DataError
         If there are fewer pixels than unknowns, or ``spin`` is another word.
     """
-    if spin not in SPINS:
-        raise DataError(f"spin is {spin!r}; it must be one of {', '.join(SPINS)}")
+    if isinstance(spin, str) and spin not in SPINS:
+        raise DataError(f"spin is {spin!r}; it must be one of {', '.join(SPINS)}, or known")
+    spin = spin if isinstance(spin, str) else array("spin", spin, (3,))
     unknowns = _Unknowns(kappa, spin, g)
     p = unknowns.vector(start or start_from_overlap(shot))
     observed = np.stack([shot.pixels_1, shot.pixels_2])
