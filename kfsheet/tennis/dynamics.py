@@ -62,6 +62,14 @@ class Ball:
         x = flights([time], self.X[None], self.V[None], self.kappa, self.spin, self.g)[0, 0]
         return replace(self, X=x[:3], V=x[3:])
 
+    def scaled(self, s: float, camera: ArrayLike) -> Ball:
+        """The ball that a camera at ``camera`` cannot tell from this one: all lengths s times.
+
+        V -> s V, g -> s g, c_D -> c_D/s; the spin stays. The scale gauge.
+        """
+        s, at = number("s", s, 0), array("camera", camera, (3,))
+        return Ball(at + s * (self.X - at), s * self.V, self.kappa / s, self.spin, s * self.g)
+
 
 def acceleration(v: ArrayLike, kappa: ArrayLike, spin: ArrayLike, g: ArrayLike) -> Array:
     """Right-hand side of (3.1) over m.

@@ -7,6 +7,7 @@ and fit the closed form (3.5) to those points, with weights, in eleven parameter
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,7 @@ from kfsheet.tennis.shots import Shot
 
 SCALE = np.array([1, 1, 1, 10, 10, 10, 0.1, 0.1, 0.1, 0.01, 10])
 """Size of X, V, lambda, c_D/m and g, to make the parameters of the fit of order 1."""
+STEP, THIN = 1e-5, 1e-9  # of derivatives, in those sizes; and of a cone that is a ray, px
 
 
 @dataclass(frozen=True)
@@ -121,6 +123,10 @@ def first_estimate(shot: Shot, g: float = GRAVITY) -> Ball:
     return Ball(found.x[:3], found.x[3:], kappa, np.zeros(3), g)
 
 
+def _vector(ball: Ball) -> Array:
+    return np.concatenate([ball.X, ball.V, ball.spin, [ball.kappa, ball.g]]) / SCALE
+
+
 def fit_closed_form(times: Array, x: Array, w: Array, start: Ball) -> Ball:
     """Weighted least squares of (3.5) in eleven parameters: X, V, lambda, c_D/m and g.
 
@@ -137,7 +143,7 @@ def fit_closed_form(times: Array, x: Array, w: Array, start: Ball) -> Ball:
         p = p * SCALE
         return ((closed_form(times, p[:3], p[3:6], p[9], p[6:9], p[10]) - x) * root).ravel()
 
-    p = np.concatenate([start.X, start.V, start.spin, [start.kappa, start.g]]) / SCALE
+    p = _vector(start)
     p = least_squares(residuals, p, method="lm", xtol=1e-12, ftol=1e-12).x * SCALE
     return Ball(p[:3], p[3:6], p[9], p[6:9], p[10])
 
@@ -191,3 +197,47 @@ def iterate(
         if reason != "limit":
             break
     return Loop(turns, reason)
+
+
+def modes(shot: Shot, ball: Ball) -> Array:
+    """What is left, after one turn, of a small change of the eleven parameters: the eigenvalues.
+
+    A fit of pseudo-positions y to (3.5) with the Jacobian J turns a change dy into
+    dp = (J'WJ)^-1 J'W dy, and a change dp moves the pseudo-positions by D dp. Cones as thin as
+    rays are the best case: within a cone a point stays where it is, and nothing is corrected.
+
+    Parameters
+    ----------
+    shot : Shot
+        The photos.
+    ball : Ball
+        Where the loop has settled.
+
+    Returns
+    -------
+    ndarray
+        (11,) moduli of the eigenvalues of (J'WJ)^-1 J'W D, the largest first; the loop forgets a
+        mode the faster, the smaller it is, and one of 1 never.
+    """
+    rays = Cones.of(shot.scene.camera_1, shot.pixels_1, THIN)
+    both, seen = shot.overlap, shot.triangulated()
+
+    def positions(p: Array) -> Array:
+        p = p * SCALE
+        return closed_form(shot.times, p[:3], p[3:6], p[9], p[6:9], p[10])
+
+    def believed(p: Array) -> Array:
+        x = rays.project(positions(p))
+        x[both] = seen[both]
+        return x
+
+    def derivative(function: Callable[[Array], Array], p: Array) -> Array:
+        steps = STEP * np.eye(len(p))
+        pairs = [(function(p + e) - function(p - e)).ravel() for e in steps]
+        return np.array(pairs).T / (2 * STEP)
+
+    p = _vector(ball)
+    root = np.repeat(np.sqrt(weights(shot, positions(p))), 3)[:, None]
+    J, D = (derivative(function, p) * root for function in (positions, believed))
+    values = np.linalg.eigvals(np.linalg.lstsq(J, D, rcond=None)[0])
+    return np.sort(np.abs(values))[::-1]
