@@ -1,5 +1,7 @@
 """Dynamics of the tennis report: expansion, closed form, flights; and the fit of pixels."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -69,15 +71,18 @@ def test_the_expansion_follows_from_3_1_and_its_printed_velocity_does_not():
     assert (wrong - spurious).applyfunc(simplify) == zeros(3, 1)
 
 
-def test_the_second_time_scale_has_the_dimension_of_a_time_only_without_a_factor():
-    """M/(c_L |Omega x V|) scales with the speed, m |V|/(c_L |Omega x V|) does not: m/s and 1."""
+def test_the_second_time_scale_is_no_time():
+    """Measure lengths in another unit: m/(c_D |V|) stays, m/(c_L |Omega x V|) changes."""
     s = symbols("s", positive=True)
-    cross = sym.length(sym.Omega.cross(sym.V))
-    printed = sym.m / (sym.c_L * cross)
-    mended = sym.length(sym.V) * printed
-    faster = {v: s * v for v in sym.V}
-    assert simplify(printed.subs(faster, simultaneous=True) / printed) == 1 / s
-    assert simplify(mended.subs(faster, simultaneous=True) / mended) == 1
+    drag = sym.m / (sym.c_D * sym.length(sym.V))
+    spin = sym.m / (sym.c_L * sym.length(sym.Omega.cross(sym.V)))
+    unit = {**{v: s * v for v in sym.V}, sym.c_D: sym.c_D / s}
+
+    def change(scale):
+        return simplify(scale.subs(unit, simultaneous=True) / scale)
+
+    assert [change(drag), change(spin)] == [1, 1 / s]
+    assert change(spin * sym.length(sym.V)) == 1
 
 
 def test_the_expansion_meets_the_flight_as_its_order_says(name):
@@ -193,10 +198,11 @@ def test_the_fit_of_the_given_pixels_is_the_references(name, c_D, where):
 
 
 def test_the_fit_finds_the_truth_without_noise(name, shot):
-    clean = simulate(shot, 0, sigma=1e-9)
+    exact = replace(shot, truth=shot.scene.ball.fly(shot.times))  # the table has six decimals
+    clean = simulate(exact, 0, sigma=1e-9)
     for options in ({}, {"g": None}, {"kappa": TRUE_DRAG}, {"spin": TRUE_SPIN}):
         ball = fit_pixels(clean, **options).ball
-        assert np.abs(ball.fly(shot.times) - shot.truth).max() < 1e-5
+        assert np.abs(ball.fly(shot.times) - exact.truth).max() < 1e-6
         assert [ball.c_D, ball.g] == pytest.approx([0.0012, 9.8], rel=1e-4)
 
 

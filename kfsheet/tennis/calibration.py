@@ -140,7 +140,7 @@ def extrapolated(calibration: Calibration, n: int = 21) -> float:
     """Share of the image in which a calibration is extrapolated: detection of bad data.
 
     A small residual says nothing of where there were no points; the leverage does, and needs no
-    further measurement. Above 2 the error of the fitted angle exceeds that of a measurement 1.4 times.
+    further measurement. Above 2 the fitted angle errs 1.4 times as much as a measured one.
 
     Parameters
     ----------
