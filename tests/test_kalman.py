@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from sympy import Matrix, Rational, Symbol, atan2, diag, eye, sqrt, symbols, zeros
 
 from kfsheet import (
+    Intermediate,
     ModelError,
     Observation,
     Recurrence,
@@ -400,3 +401,41 @@ def test_names_that_are_taken_are_refused_and_nothing_is_added():
     with pytest.raises(ModelError, match=r"x_a.*taken"):
         add_filter(m, model, section="Filter")
     assert set(m.table) == {"x_a"}
+
+
+def test_a_transition_through_intermediates_is_the_same_filter():
+    """A midpoint step of x' = -k x^2 in one formula, and in three, with its derivative."""
+    frames = []
+    for through in (False, True):
+        m = Recurrence("decay", title="Decay", step="row")
+        k, dt = m.parameter("k", 0.3, "", "rate"), m.parameter("dt", 0.1, "", "step")
+        y = m.data("y", [2, 1.9, math.nan, 1.8, 1.7], "", "seen", section="D", may_be_missing=True)
+        x, slope, half = (Symbol(name, real=True) for name in ("x", "slope", "half"))
+        formulas = {slope: -k * x**2, half: x + slope * dt / 2}
+        rule = x - k * half**2 * dt
+        plain = rule.subs(half, formulas[half]).subs(slope, formulas[slope])
+        model = StateSpace(
+            {x: State("", "x", 2, 1)},
+            [rule if through else plain],
+            Matrix([[Rational(1, 8)]]),
+            [Observation("y", y[t], x, Rational(1, 4), "")],
+            {w: Intermediate("", str(w), f) for w, f in formulas.items()} if through else {},
+        )
+        add_filter(m, model, section="F")
+        frames.append(evaluate(m))
+    one, three = frames
+    assert {"slope", "half", "D_slope_x", "D_half_x"} <= set(three.columns) - set(one.columns)
+    for column in one.columns:
+        assert_close(three[column], one[column], 1e-14)
+
+
+def test_an_intermediate_reads_only_those_before_it():
+    x, a, b = symbols("x a b", real=True)
+    with pytest.raises(ModelError, match="after it"):
+        StateSpace(
+            {x: State("", "x", 0, 1)},
+            [a],
+            Matrix([[0]]),
+            [Observation("y", x, x, 1, "")],
+            {a: Intermediate("", "a", b * x), b: Intermediate("", "b", x)},
+        )
