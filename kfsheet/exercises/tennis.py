@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sympy import Expr, Matrix, Min, S, Symbol, diag, floor, sqrt, zeros
+from sympy import Expr, Matrix, Min, Piecewise, S, Symbol, diag, floor, sqrt, zeros
 
 from kfsheet.charts import Chart, Series
 from kfsheet.exercise import Exercise, Question
@@ -18,6 +18,7 @@ from kfsheet.expressions import (
     Last,
     Mean,
     Missing,
+    Observed,
     Sum,
     SumProduct,
     t,
@@ -307,7 +308,12 @@ def _errors(m: Recurrence, shot: Shot) -> None:
     for name in PHOTOS:
         variance = m["S_u1" if name == "u1" else f"S_{name}_f"][t]
         low, high = m.columns(f"d_{name}_low", f"d_{name}_high", section=page)
-        band, words = when_observed(m[f"d_{name}"][t], 2 * sqrt(variance)), f"band of d_{name}"
+        # The band of the start, hundreds of pixels wide, would make the chart of the rest a line.
+        settled = variance < 12 * m["sigma_px"] ** 2
+        band = Piecewise(
+            (2 * sqrt(variance), Observed(m[f"d_{name}"][t]) & settled), (Missing, True)
+        )
+        words = f"band of d_{name}, once it is narrow"
         m.define(high[t], band, "px", f"{words}: +2 sigma", start=[Missing])
         m.define(low[t], when_observed(high[t], -high[t]), "px", f"{words}: -2 sigma")
     (seen,) = m.columns("n_seen", section=page)
