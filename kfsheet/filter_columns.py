@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Generator, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,6 +18,7 @@ from kfsheet.expressions import (
     t,
     when_observed,
 )
+from kfsheet.names import CHARACTER_CODE
 from kfsheet.units import parse_unit, unit_text
 
 if TYPE_CHECKING:
@@ -34,6 +36,15 @@ def wrapped(angle: Expr) -> Expr:
     (-pi/2, pi)
     """
     return pi - Mod(pi - angle, 2 * pi)
+
+
+def readable(name: str) -> str:
+    """The name, without underscores that would make a part of it the code of a character.
+
+    >>> readable("K_y_theta"), readable("K_x1_theta")
+    ('K_y_theta', 'Kx1_theta')
+    """
+    return re.sub(f"_(?={CHARACTER_CODE[1:]})", "", name)
 
 
 class Definition(NamedTuple):
@@ -91,7 +102,7 @@ class FilterColumns:
 
     def cell(self, name: str, back: int = 0) -> Indexed:
         """Cell of a column of this filter, ``back`` rows above."""
-        return ColumnBase(name + self.suffix, real=True)[t - back]
+        return ColumnBase(readable(name + self.suffix), real=True)[t - back]
 
     def P_name(self, i: int, j: int, stage: str) -> str:
         """Name of an entry of a covariance."""
@@ -127,7 +138,7 @@ class FilterColumns:
         self, name: str, rule: Expr, unit: Any, words: str, start: Expr = Missing
     ) -> Definition:
         """A definition, its name with the suffix."""
-        return Definition(name + self.suffix, rule, unit_text(unit), words, start)
+        return Definition(readable(name + self.suffix), rule, unit_text(unit), words, start)
 
     def covariance(self, i: int, j: int, stage: str, rule: Expr, start: Expr) -> Definition:
         """An entry of a covariance at a stage."""
@@ -184,7 +195,11 @@ class FilterColumns:
             inner = Add(*(value.diff(w) * slope[j] for w, slope in known.items()))
             words = f"derivative of {what} with respect to {symbol}"
             slope = yield from self.derivative(
-                f"{name}_{symbol}", value.diff(symbol) + inner, x_a, unit / self.units[j], words
+                f"{name}_{symbol}",
+                value.diff(symbol) + inner,
+                x_a,
+                unit / self.units[j],
+                words,
             )
             found.append(slope)
         return found

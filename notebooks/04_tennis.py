@@ -356,7 +356,7 @@ pd.DataFrame(rows).T
 # %%
 formulas = kf.formula_table(tennis, "Kalman filter", rows=2)
 with pd.option_context("display.max_colwidth", None):
-    display(formulas.loc[["vm1", "D_vm1_vx1", "x1_f", "d_u1", "H_u1_x1", "K_x1_u1"], ["row 5"]])
+    display(formulas.loc[["vm1", "D_vm1_vx1", "x1_f", "d_u1", "H_u1_x1", "Kx1_u1"], ["row 5"]])
 
 # %% [markdown]
 # Does the sheet compute what NumPy computes? IronCalc recalculates the workbook from nothing; we
@@ -443,7 +443,7 @@ sheet = [run.attrs["scalars"][n] for n in names]
 pd.DataFrame({"sheet": sheet, "truth": [x[0], x[1], time]}, names).T.round(3)
 
 # %% [markdown]
-# Five millimetres in depth, one sideways; the last eighth of the flight nobody saw.
+# Eight millimetres in depth, two sideways; the last seventh of the flight nobody saw.
 #
 # ## What if
 #

@@ -1,6 +1,7 @@
 """The filter builder against filters that are written otherwise: joint, batch, exact, filterpy."""
 
 import math
+import re
 from fractions import Fraction
 
 import numpy as np
@@ -439,3 +440,20 @@ def test_an_intermediate_reads_only_those_before_it():
             [Observation("y", x, x, 1, "")],
             {a: Intermediate("", "a", b * x), b: Intermediate("", "b", x)},
         )
+
+
+def test_no_name_holds_what_libreoffice_reads_as_the_code_of_a_character():
+    """It shows K_x1_u as Ku, for _x1_ is the character 1; a state may be called x1 all the same."""
+    m = Recurrence("code", title="Code", step="row")
+    y = m.data("y", [1, 2, 3], "", "seen", section="D")
+    x1, x2 = symbols("x1 x2", real=True)
+    state = {x1: State("", "a", 0, 1), x2: State("", "b", 0, 1)}
+    seen = [Observation("y", y[t], x1 * x2 + x1, 1, "")]
+    model = StateSpace(state, [x1 + x2, x1 * x2], eye(2), seen)
+    for suffix in ("", "_lin"):
+        add_filter(m, model, section=f"F{suffix}", suffix=suffix)
+    names = [*m.table, *m.parameters]
+    assert {"Kx1_y", "x1_f_lin", "Fx2x1_lin"} <= set(names)
+    assert not [name for name in names if re.search("_x[0-9A-Fa-f]{1,4}_", name)]
+    with pytest.raises(ModelError, match="LibreOffice"):
+        m.parameter("K_x1_u", 1, "", "refused")

@@ -297,12 +297,12 @@ def _errors(m: Recurrence, shot: Shot) -> None:
     for k, words in AXES.items():
         true = m.data(f"x{k}_true", shot.truth[:, k - 1], "m", f"truth, {words}", section=page)
         for run, what in (("tri", "triangulation"), ("a", "filter")):
-            (e,) = m.columns(f"e_x{k}_{run}", section=page)
+            (e,) = m.columns(f"e_{run}_x{k}", section=page)
             estimate = m[f"x{k}_{run}"][t]
             error = estimate - true[t]
             seen = when_observed(estimate, error) if run == "tri" else error
             m.define(e[t], seen, "m", f"error of x{k}, {what}")
-            m.summary(f"rms_x{k}_{run}", RMS(e), "m", f"rms error of x{k}, {what}")
+            m.summary(f"rms_{run}_x{k}", RMS(e), "m", f"rms error of x{k}, {what}")
             if run == "a":
                 m.summary(f"end_x{k}", Last(e), "m", f"error of x{k} in the last image, filter")
     for name in PHOTOS:
@@ -386,8 +386,8 @@ CHARTS = (
         "time (s)",
         "estimate - truth (m)",
         (
-            Series("time", "e_x1_tri", "triangulation", "observation"),
-            Series("time", "e_x1_a", "filter", "line"),
+            Series("time", "e_tri_x1", "triangulation", "observation"),
+            Series("time", "e_a_x1", "filter", "line"),
         ),
         note="What both cameras knew early, the equation of the flight carries on.",
     ),
