@@ -410,7 +410,7 @@ CHARTS = (
         "A ball lit from the side",
         "pixel to the right (px)",
         "brightness",
-        (Series("i_px", "light", "all lines of the image", "first"),),
+        (Series("i_px", "light", "all lines of the image", "observation"),),
         note="Each point is a pixel. The centre of intensity moves to the light.",
     ),
 )
