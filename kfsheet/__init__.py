@@ -25,7 +25,7 @@ _HOMES = {
     "kfsheet.expressions": "Count Largest Last Mean Missing Observed RMS Smallest Std Sum "
     "SumProduct t when_observed",
     "kfsheet.fitting": "least_squares newton_step normal_equations",
-    "kfsheet.kalman": "Observation State StateSpace add_filter",
+    "kfsheet.kalman": "Intermediate Observation State StateSpace add_filter",
     "kfsheet.latex": "latex_code",
     "kfsheet.members": "Draws NEES Study",
     "kfsheet.plots": "draw",

@@ -26,6 +26,7 @@ from kfsheet.pythoncode import python_code
 
 LARGEST_NUMBER, LARGEST_DENOMINATOR = 12, 16
 FULL_CIRCLE = {60, 90, 180, 360}
+REMEMBERED = 4096  # expressions whose parts are asked for again and again by schedule()
 ENDLESS = 1_048_576  # more rows than a worksheet has
 
 
@@ -84,14 +85,13 @@ def walk(expression: Basic) -> Iterator[Basic]:
             yield from walk(argument)
 
 
-# Every new definition asks these of the definitions before it: hence the memory.
-@lru_cache(maxsize=4096)
+@lru_cache(maxsize=REMEMBERED)
 def scalars(expression: Basic) -> frozenset[Symbol]:
     """Symbols that stand for scalars, or for the row index."""
     return frozenset(node for node in walk(expression) if isinstance(node, Symbol))
 
 
-@lru_cache(maxsize=4096)
+@lru_cache(maxsize=REMEMBERED)
 def columns_read(expression: Basic) -> frozenset[str]:
     """Names of the columns that an expression reads, row by row or as a whole."""
     return frozenset(str(base.label) for base in expression.atoms(IndexedBase))

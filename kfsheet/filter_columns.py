@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Generator, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,6 +18,7 @@ from sympy import (
     Or,
     Piecewise,
     S,
+    Symbol,
     expand,
     pi,
     sqrt,
@@ -32,6 +34,7 @@ from kfsheet.expressions import (
     t,
     when_observed,
 )
+from kfsheet.names import CHARACTER_CODE
 from kfsheet.units import parse_unit, unit_text
 
 if TYPE_CHECKING:
@@ -49,6 +52,15 @@ def wrapped(angle: Expr) -> Expr:
     (-pi/2, pi)
     """
     return pi - Mod(pi - angle, 2 * pi)
+
+
+def readable(name: str) -> str:
+    """The name, without underscores that would make a part of it the code of a character.
+
+    >>> readable("K_y_theta"), readable("K_x1_theta")
+    ('K_y_theta', 'Kx1_theta')
+    """
+    return re.sub(f"_(?={CHARACTER_CODE[1:]})", "", name)
 
 
 class Definition(NamedTuple):
@@ -106,7 +118,7 @@ class FilterColumns:
 
     def cell(self, name: str, back: int = 0) -> Indexed:
         """Cell of a column of this filter, ``back`` rows above."""
-        return ColumnBase(name + self.suffix, real=True)[t - back]
+        return ColumnBase(readable(name + self.suffix), real=True)[t - back]
 
     def P_name(self, i: int, j: int, stage: str) -> str:
         """Name of an entry of a covariance."""
@@ -121,9 +133,16 @@ class FilterColumns:
 
         return Matrix(len(self.all), len(self.all), entry)
 
+    @property
+    def changing(self) -> set[Symbol]:
+        """Symbols whose values differ from row to row."""
+        return {*self.model.state, *self.model.intermediates}
+
     def at(self, expression: Expr, cells: Sequence[Expr]) -> Expr:
-        """An expression in the symbols of the state, with cells in their place."""
-        return expression.xreplace(dict(zip(self.model.state, cells, strict=True)))
+        """An expression in symbols of the state and intermediates, with cells in their place."""
+        known = dict(zip(self.model.state, cells, strict=True))
+        known |= {w: self.cell(w.name) for w in self.model.intermediates}
+        return expression.xreplace(known)
 
     def gaps(self, expression: Expr) -> tuple[Indexed, ...]:
         """Cells in an expression that may be missing from row 1 on."""
@@ -135,7 +154,7 @@ class FilterColumns:
         self, name: str, rule: Expr, unit: Any, words: str, start: Expr = Missing
     ) -> Definition:
         """A definition, its name with the suffix."""
-        return Definition(name + self.suffix, rule, unit_text(unit), words, start)
+        return Definition(readable(name + self.suffix), rule, unit_text(unit), words, start)
 
     def covariance(self, i: int, j: int, stage: str, rule: Expr, start: Expr) -> Definition:
         """An entry of a covariance at a stage."""
@@ -149,7 +168,7 @@ class FilterColumns:
         self, name: str, entry: Expr, cells: Sequence[Expr], unit: Any, words: str
     ) -> Generator[Definition, None, Expr]:
         """An entry of a Jacobian: a constant stays where it is used, others get a column."""
-        if not entry.free_symbols & set(self.model.state):
+        if not entry.free_symbols & self.changing and not column_references(entry):
             return entry
         yield self.column(name, self.at(entry, cells), unit, words)
         return self.cell(name)
@@ -159,15 +178,16 @@ class FilterColumns:
     def forecast(self) -> Iterator[Definition]:
         """x_f = f(x_a) and P_f = F P_a F' + Q."""
         x_a = [self.cell(f"{name}_a", back=1) for name in self.names]
+        slopes: dict[Symbol, list[Expr]] = {}
+        for w, item in self.model.intermediates.items():
+            unit = parse_unit(item.unit)
+            yield self.column(w.name, self.at(item.value, x_a), unit, item.description)
+            slopes[w] = yield from self.slopes(f"D_{w}", w.name, item.value, unit, x_a, slopes)
         F = zeros(len(self.all), len(self.all))
-        for i, j in itertools.product(self.all, repeat=2):
-            to, of = self.names[i], self.names[j]
-            F[i, j] = yield from self.derivative(
-                f"F_{to}_{of}",
-                self.model.F[i, j],
-                x_a,
-                self.units[i] / self.units[j],
-                f"derivative of the next {to} with respect to {of}",
+        for i, rule in enumerate(self.model.transition):
+            to, unit = self.names[i], self.units[i]
+            F[i, :] = Matrix(
+                [(yield from self.slopes(f"F_{to}", f"the next {to}", rule, unit, x_a, slopes))]
             )
         for name, element, unit, rule in zip(
             self.names, self.elements, self.units, self.model.transition, strict=True
@@ -175,6 +195,30 @@ class FilterColumns:
             words = f"forecast: {element.description}"
             yield self.column(f"{name}_f", self.at(rule, x_a), unit, words, element.start)
         yield from self.forecast_covariance(F, self.model.Q.applyfunc(lambda e: self.at(e, x_a)))
+
+    def slopes(
+        self,
+        name: str,
+        what: str,
+        value: Expr,
+        unit: Any,
+        x_a: Sequence[Expr],
+        known: dict[Symbol, list[Expr]],
+    ) -> Generator[Definition, None, list[Expr]]:
+        """Derivatives of a value with respect to the state, by the chain rule."""
+        found = []
+        for j, symbol in enumerate(self.model.state):
+            inner = Add(*(value.diff(w) * slope[j] for w, slope in known.items()))
+            words = f"derivative of {what} with respect to {symbol}"
+            slope = yield from self.derivative(
+                f"{name}_{symbol}",
+                value.diff(symbol) + inner,
+                x_a,
+                unit / self.units[j],
+                words,
+            )
+            found.append(slope)
+        return found
 
     def forecast_covariance(self, F: Matrix, Q: Matrix) -> Iterator[Definition]:
         """P_f = F P_a F' + Q, the upper triangle."""

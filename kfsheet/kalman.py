@@ -20,7 +20,7 @@ sequential update: A. H. Jazwinski, Stochastic Processes and Filtering Theory, s
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from sympy import Expr, Matrix, Symbol, sympify
@@ -91,6 +91,29 @@ class Observation:
 
 
 @dataclass(frozen=True)
+class Intermediate:
+    """A quantity on the way from one state to the next, in a column of its own.
+
+    A transition that would make formulas too long, as the second half of a midpoint step, is
+    written in terms of such quantities. Their derivatives get columns too, by the chain rule.
+
+    Parameters
+    ----------
+    unit, description : str
+        Unit as in ``"m/s"``, and plain words.
+    value : Expr
+        A function of the symbols of the state, and of intermediates before it.
+    """
+
+    unit: str
+    description: str
+    value: Expr
+
+    def __post_init__(self) -> None:
+        _sympify(self, "value")
+
+
+@dataclass(frozen=True)
 class StateSpace:
     """A model of a state and of what is observed of it.
 
@@ -104,17 +127,21 @@ class StateSpace:
         n x n covariance that a step adds, symmetric.
     observations : sequence of Observation
         In the order in which they are assimilated.
+    intermediates : mapping of Symbol to Intermediate, optional
+        Quantities that ``transition`` may read, in the order in which they are computed.
 
     Raises
     ------
     ModelError
-        If a shape does not fit, Q is not symmetric, or two observations share a name.
+        If a shape does not fit, Q is not symmetric, two observations share a name, or an
+        intermediate reads one that comes after it.
     """
 
     state: Mapping[Symbol, State]
     transition: Sequence[Expr]
     Q: Matrix
     observations: Sequence[Observation]
+    intermediates: Mapping[Symbol, Intermediate] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         n = len(self.state)
@@ -127,14 +154,22 @@ class StateSpace:
         names = [o.name for o in self.observations]
         if not names or len(set(names)) < len(names):
             raise ModelError(f"give one or more observations of different names, not {names}")
+        waiting = set(self.intermediates)
+        for symbol, item in self.intermediates.items():
+            if waiting & item.value.free_symbols:
+                raise ModelError(f"intermediate {symbol} reads itself or one that comes after it")
+            waiting.remove(symbol)
         for k, o in enumerate(self.observations):
             if self.H[k, :].is_zero_matrix:
                 raise ModelError(f"observation {o.name} depends on no element of the state")
 
     @cached_property
     def F(self) -> Matrix:
-        """Jacobian of the transition, n x n."""
-        return Matrix(list(self.transition)).jacobian(list(self.state))
+        """Jacobian of the transition, n x n, as a function of the state alone."""
+        f = Matrix(list(self.transition))
+        for symbol, item in reversed(self.intermediates.items()):
+            f = f.xreplace({symbol: item.value})
+        return f.jacobian(list(self.state))
 
     @cached_property
     def H(self) -> Matrix:
@@ -142,7 +177,7 @@ class StateSpace:
         return Matrix([o.predicted for o in self.observations]).jacobian(list(self.state))
 
 
-def _sympify(thing: State | Observation, *names: str) -> None:
+def _sympify(thing: State | Observation | Intermediate, *names: str) -> None:
     """Plain numbers are welcome where formulas are."""
     for name in names:
         if getattr(thing, name) is not None:
@@ -158,7 +193,8 @@ def add_filter(m: Recurrence, model: StateSpace, *, section: str, suffix: str = 
     observations, ..., and ``x_a``, ``P_xx_a`` (analysis); at the end ``NIS``, the normalised
     innovation squared, d' S^-1 d. From the second observation on there are also ``d_r_left``, what
     the observations before it have left of the innovation, and ``S_r_f``, the variance of ``d_r``
-    itself. Row 0 holds the start values; assimilation begins in row 1.
+    itself. Intermediates come first of all, each with its derivatives ``D_w_x``. Row 0 holds the
+    start values; assimilation begins in row 1.
 
     Parameters
     ----------

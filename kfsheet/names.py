@@ -9,6 +9,7 @@ from collections.abc import Collection
 from openpyxl.utils import column_index_from_string
 
 LAST_COLUMN = 16_384  # XFD
+CHARACTER_CODE = r"_x[0-9A-Fa-f]{1,4}_"  # Excel wants four digits, LibreOffice does with fewer
 LAST_ROW = 1_048_576
 # The generated Python source, or a keyword of evaluate(), uses these itself.
 RESERVED = frozenset(
@@ -25,6 +26,8 @@ def name_problem(name: str) -> str | None:
     """Why ``name`` cannot be a column; None if it can."""
     if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
         return "a name is a letter followed by letters, digits and underscores"
+    if code := re.search(CHARACTER_CODE, name):
+        return f"LibreOffice reads {code[0]} as the code of a character; leave an underscore out"
     if keyword.iskeyword(name):
         return "this is a word of the Python language"
     if name in RESERVED or name.startswith("kfsheet"):

@@ -65,6 +65,7 @@ class Recurrence:
         self.summaries: dict[str, Scalar] = {}
         self.table: dict[str, Column] = {}
         self.clock: Column | None = None
+        self._steps: dict[str, str] = {}  # of sections whose rows are something else
         self._readers: dict[str, set[str]] = {}  # who reads a column
         self.version = 0
         """How often something was added; so a run can tell whether what it knows is current."""
@@ -230,6 +231,21 @@ class Recurrence:
         self.version += 1
         return self.clock.base
 
+    def rows_are(self, section: str, step: str) -> None:
+        """Say that a row of ``section`` is another thing than elsewhere: an angle, a pixel.
+
+        Such a worksheet counts its own steps and shows no clock.
+
+        Raises
+        ------
+        ModelError
+            If the name of the step is taken or is no word.
+        """
+        checks.check_words(section, step)
+        if problem := self._taken(step):
+            raise ModelError(f"step {step!r} of section {section!r}: {problem}")
+        self._steps[section] = step
+
     # -- asking it -------------------------------------------------------------------------
 
     def __getitem__(self, names: str | tuple[str, ...]) -> Any:
@@ -255,6 +271,14 @@ class Recurrence:
         for column in self.table.values():
             result.setdefault(column.section, []).append(column)
         return result
+
+    def step_of(self, section: str) -> str:
+        """What a row of a worksheet is."""
+        return self._steps.get(section, self.step)
+
+    def clock_of(self, section: str) -> list[Column]:
+        """The clock, where the rows of a worksheet follow it; else nothing."""
+        return [self.clock] if self.clock and section not in self._steps else []
 
     @property
     def start_rows(self) -> int:
@@ -354,8 +378,11 @@ class Recurrence:
     def _scalars(self) -> dict[str, Parameter | Scalar]:
         return {**self.parameters, **self.derived_scalars, **self.summaries}
 
+    def _own_headers(self) -> set[str]:
+        return {"time", self.step, *self._steps.values()}
+
     def _taken(self, name: str) -> str | None:
-        taken = name in self._scalars() or name in self.table or name in ("time", self.step)
+        taken = name in self._scalars() or name in self.table or name in self._own_headers()
         return "the name is taken" if taken else None
 
     def _checked(self, name: str, expression: Expr) -> Expr:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from sympy import Basic
 
-from kfsheet.checks import columns_read, scalars
+from kfsheet.checks import REMEMBERED, columns_read, scalars
 from kfsheet.errors import ModelError
 from kfsheet.expressions import column_references, lag
 from kfsheet.parts import Column, Scalar
@@ -95,7 +95,7 @@ def _circle(reads: dict[str, set[str]]) -> list[str]:
         path.append(following)
 
 
-@lru_cache(maxsize=4096)
+@lru_cache(maxsize=REMEMBERED)
 def same_row(expression: Basic) -> frozenset[str]:
     """Names of the columns that an expression reads in its own row."""
     return frozenset(str(c.base.label) for c in column_references(expression) if lag(c) == 0)

@@ -68,7 +68,7 @@ def as_excel(model: Recurrence) -> str:
         lines.append(f"  {name:12} {get_column_letter(column)}{row:<5} {formula}")
     for section, columns in model.sections.items():
         lines += ["", section]
-        for column in (*([model.clock] if model.clock else []), *columns):
+        for column in (*model.clock_of(section), *columns):
             letter = get_column_letter(layout.columns[section][column.name])
             rows = range(max(1, len(column.rules)))
             for row, text in zip(rows, _texts(layout, section, column, rows), strict=True):
@@ -105,7 +105,7 @@ def formula_table(model: Recurrence, section: str, rows: int = 3) -> pd.DataFram
             get_column_letter(layout.columns[section][column.name]),
             *_texts(layout, section, column, range(rows)),
         ]
-        for column in (*([model.clock] if model.clock else []), *model.sections[section])
+        for column in (*model.clock_of(section), *model.sections[section])
     }
     headers = ["column", *(f"row {FIRST_ROW + row}" for row in range(rows))]
     return pd.DataFrame.from_dict(table, orient="index", columns=headers)
@@ -119,7 +119,7 @@ def as_table(model: Recurrence) -> str:
         f"{name:12} {value:<14.7g} {pretty_unit(units[name])}" for name, value in scalars.items()
     ]
     for section, columns in model.sections.items():
-        names = [*(["time"] if model.clock else []), *(c.name for c in columns)]
+        names = [c.name for c in (*model.clock_of(section), *columns)]
         part = frame[names].rename(columns={n: f"{n} [{pretty_unit(units[n])}]" for n in names})
         text = part.to_string(line_width=WIDTH, float_format="%.5g", na_rep="")
         lines += ["", section, *(line.rstrip() for line in text.splitlines())]

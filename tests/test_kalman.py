@@ -1,6 +1,7 @@
 """The filter builder against filters that are written otherwise: joint, batch, exact, filterpy."""
 
 import math
+import re
 from fractions import Fraction
 from itertools import islice
 
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 from sympy import Matrix, Rational, Symbol, atan2, diag, eye, sqrt, symbols, zeros
 
 from kfsheet import (
+    Intermediate,
     ModelError,
     Observation,
     Recurrence,
@@ -434,3 +436,58 @@ def test_names_that_are_taken_are_refused_and_nothing_is_added():
     with pytest.raises(ModelError, match=r"x_a.*taken"):
         add_filter(m, model, section="Filter")
     assert set(m.table) == {"x_a"}
+
+
+def test_a_transition_through_intermediates_is_the_same_filter():
+    """A midpoint step of x' = -k x^2 in one formula, and in three, with its derivative."""
+    frames = []
+    for through in (False, True):
+        m = Recurrence("decay", title="Decay", step="row")
+        k, dt = m.parameter("k", 0.3, "", "rate"), m.parameter("dt", 0.1, "", "step")
+        y = m.data("y", [2, 1.9, math.nan, 1.8, 1.7], "", "seen", section="D", may_be_missing=True)
+        x, slope, half = (Symbol(name, real=True) for name in ("x", "slope", "half"))
+        formulas = {slope: -k * x**2, half: x + slope * dt / 2}
+        rule = x - k * half**2 * dt
+        plain = rule.subs(half, formulas[half]).subs(slope, formulas[slope])
+        model = StateSpace(
+            {x: State("", "x", 2, 1)},
+            [rule if through else plain],
+            Matrix([[Rational(1, 8)]]),
+            [Observation("y", y[t], x, Rational(1, 4), "")],
+            {w: Intermediate("", str(w), f) for w, f in formulas.items()} if through else {},
+        )
+        add_filter(m, model, section="F")
+        frames.append(evaluate(m))
+    one, three = frames
+    assert {"slope", "half", "D_slope_x", "D_half_x"} <= set(three.columns) - set(one.columns)
+    for column in one.columns:
+        assert_close(three[column], one[column], 1e-14)
+
+
+def test_an_intermediate_reads_only_those_before_it():
+    x, a, b = symbols("x a b", real=True)
+    with pytest.raises(ModelError, match="after it"):
+        StateSpace(
+            {x: State("", "x", 0, 1)},
+            [a],
+            Matrix([[0]]),
+            [Observation("y", x, x, 1, "")],
+            {a: Intermediate("", "a", b * x), b: Intermediate("", "b", x)},
+        )
+
+
+def test_no_name_holds_what_libreoffice_reads_as_the_code_of_a_character():
+    """It shows K_x1_u as Ku, for _x1_ is the character 1; a state may be called x1 all the same."""
+    m = Recurrence("code", title="Code", step="row")
+    y = m.data("y", [1, 2, 3], "", "seen", section="D")
+    x1, x2 = symbols("x1 x2", real=True)
+    state = {x1: State("", "a", 0, 1), x2: State("", "b", 0, 1)}
+    seen = [Observation("y", y[t], x1 * x2 + x1, 1, "")]
+    model = StateSpace(state, [x1 + x2, x1 * x2], eye(2), seen)
+    for suffix in ("", "_lin"):
+        add_filter(m, model, section=f"F{suffix}", suffix=suffix)
+    names = [*m.table, *m.parameters]
+    assert {"Kx1_y", "x1_f_lin", "Fx2x1_lin"} <= set(names)
+    assert not [name for name in names if re.search("_x[0-9A-Fa-f]{1,4}_", name)]
+    with pytest.raises(ModelError, match="LibreOffice"):
+        m.parameter("K_x1_u", 1, "", "refused")

@@ -9,7 +9,16 @@ import pytest
 from openpyxl.formula import Tokenizer
 from openpyxl.utils import FORMULAE
 
-from kfsheet import WorkbookError, evaluate, write_workbook
+from kfsheet import (
+    Exercise,
+    ModelError,
+    Recurrence,
+    WorkbookError,
+    check_workbook,
+    evaluate,
+    t,
+    write_workbook,
+)
 from kfsheet.excel.layout import FIRST_ROW
 from kfsheet.excel.recalculate import convert, recalculate
 from kfsheet.excel.workbook import is_formula, workbook_bytes
@@ -204,3 +213,38 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path):
     with pytest.raises(WorkbookError, match="cannot be written"):
         write_workbook(exercise, tmp_path / "football.xlsx")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "football.xlsx"]
+
+
+def pages(steps):
+    m = Recurrence("pages", title="Two pages", step="row", rows=4)
+    long = m.parameter("long", 1172.9245234289695, "m", "a number of 17 digits")
+    m.time(t * 1, "", "time")
+    m.columns("a", section="First"), m.columns("b", section="Second")
+    m.define(m["a"][t], t * long, "m", "a")
+    m.define(m["b"][t], m["a"][t], "m", "b")
+    for section, step in steps.items():
+        m.rows_are(section, step)
+    return Exercise(model=m, about=("About.",), source="none")
+
+
+def test_a_sheet_may_count_other_things_than_the_clocks_steps(tmp_path):
+    exercise = pages({"First": "angle"})
+    path = write_workbook(exercise, tmp_path)
+    book = openpyxl.load_workbook(path)
+    assert [cell.value for cell in book["First"][1]] == ["angle", "a"]
+    assert [cell.value for cell in book["Second"][1]] == ["row", "time", "b"]
+    assert not check_workbook(path, exercise).problems
+
+
+def test_a_step_needs_a_name_of_its_own():
+    for taken in ("a", "time", "row", "long"):
+        with pytest.raises(ModelError, match="taken"):
+            pages({"First": taken})
+
+
+def test_a_number_keeps_its_17_digits(tmp_path):
+    """openpyxl writes 16; the parameter would come back changed."""
+    path = write_workbook(pages({}), tmp_path)
+    cell = openpyxl.load_workbook(path)["Parameters"]["B5"]
+    assert cell.value == 1172.9245234289695
+    assert float(f"{cell.value:.16g}") != cell.value

@@ -184,7 +184,7 @@ class Comparison:
         model = self.layout.model
         for name, number in self.layout.columns.get(sheet, {}).items():
             if number == column:
-                return f"{name}, {model.step} {row - FIRST_ROW}: "
+                return f"{name}, {model.step_of(sheet)} {row - FIRST_ROW}: "
         names = (name for name, cell in self.layout.scalars.items() if cell == address)
         return next((f"{name}: " for name in names), "")
 

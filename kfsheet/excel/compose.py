@@ -83,13 +83,14 @@ def stored(value: float, kind: str = "") -> float | str:
 def section_page(layout: Layout, section: str, now: Run) -> Page:
     """The worksheet of one section."""
     model, columns = layout.model, layout.columns[section]
-    page = Page(section, freeze=f"{get_column_letter(3 if model.clock else 2)}{FIRST_ROW}")
+    step, clock = model.step_of(section), model.clock_of(section)
+    page = Page(section, freeze=f"{get_column_letter(2 + len(clock))}{FIRST_ROW}")
     page.heights[3] = 48
-    _head(page, columns["t"], model.step, "", f"number of the {model.step}", 8)
+    _head(page, columns["t"], step, "", f"number of the {step}", 8)
     for row in range(model.rows):
         page.put(FIRST_ROW + row, columns["t"], row, "index", format="0")
-    if model.clock:
-        _formula_column(page, layout, model.clock, columns["time"], now)
+    for column in clock:
+        _formula_column(page, layout, column, columns["time"], now)
     for column in model.sections[section]:
         if column.is_data:
             _data_column(page, column, columns[column.name], now)

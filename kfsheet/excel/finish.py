@@ -1,7 +1,8 @@
 """One pass over the parts of a saved workbook: stored values in, moments of time out.
 
-openpyxl writes formulas without their values and stamps files with the hour. A previewer, pandas
-or a phone needs the values; a build that is to be compared byte by byte must not know the hour.
+openpyxl writes formulas without their values, numbers with 16 digits, and stamps files with the
+hour. A previewer, pandas or a phone needs the values; some numbers need 17 digits; a build that is
+to be compared byte by byte must not know the hour.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from xml.sax.saxutils import escape
 
 EPOCH = (1980, 1, 1, 0, 0, 0)
 FORMULA = re.compile(r'<c r="([A-Z]+\d+)"([^>]*)><f>(.*?)</f><v ?/?>(?:</v>)?</c>', re.DOTALL)
+NUMBER = re.compile(r'(<c r="([A-Z]+\d+)"[^>]*><v>)([^<]*)</v>')
 # An empty cell that is typed as a number is read as 0 by some programs.
 EMPTY = re.compile(r'(<c r="[A-Z]+\d+"(?: s="\d+")?) t="n"(?: ?/>|></c>)')
 MOMENT = re.compile(r"(<dcterms:(created|modified)[^>]*>)[^<]*(</dcterms:\2>)")
@@ -27,7 +29,7 @@ Value = float | int | str | bool | None
 
 
 def finish(saved: bytes, values: Mapping[str, Mapping[str, Value]]) -> bytes:
-    """A saved workbook with ``values[part][cell]`` stored in its formula cells.
+    """A saved workbook with ``values[part][cell]`` stored in its formula cells, and in numbers.
 
     ``part`` is the name inside the zip, ``xl/worksheets/sheet1.xml``.
     """
@@ -53,7 +55,11 @@ def _with_values(xml: str, values: Mapping[str, Value]) -> str:
         kind, text = _typed(values[address])
         return f'<c r="{address}"{attributes}{kind}><f>{formula}</f><v>{text}</v></c>'
 
-    return EMPTY.sub(r"\1 />", FORMULA.sub(cell, xml))
+    def number(match: re.Match) -> str:
+        head, address, text = match.groups()
+        return f"{head}{values.get(address, text)!s}</v>"
+
+    return EMPTY.sub(r"\1 />", FORMULA.sub(cell, NUMBER.sub(number, xml)))
 
 
 def _typed(value: Value) -> tuple[str, str]:

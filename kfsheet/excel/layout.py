@@ -40,9 +40,13 @@ class Layout:
     @classmethod
     def standard(cls, model: Recurrence) -> Layout:
         """The layout in which workbooks are written."""
-        lead = ["t", "time"] if model.clock else ["t"]
         columns = {
-            section: {name: n for n, name in enumerate([*lead, *(c.name for c in those)], 1)}
+            section: {
+                name: n
+                for n, name in enumerate(
+                    ["t", *(c.name for c in (*model.clock_of(section), *those))], 1
+                )
+            }
             for section, those in model.sections.items()
         }
         scalars: dict[str, Address] = {}

@@ -81,8 +81,9 @@ def _columns_of(book: Workbook, model: Recurrence, section: str, path: Path) -> 
         raise WorkbookError(f"{path}: the sheet {section!r} is gone or renamed")
     headers = [cell.value for cell in book[section][SYMBOL_ROW]]
     found = {value: column for column, value in enumerate(headers, 1)}
-    keys = {"t": model.step, **({"time": "time"} if model.clock else {})}
-    keys |= {column.name: column.name for column in model.sections[section]}
+    keys = {"t": model.step_of(section)}
+    columns = [*model.clock_of(section), *model.sections[section]]
+    keys |= {column.name: column.name for column in columns}
     if missing := [header for header in keys.values() if header not in found]:
         raise WorkbookError(
             f"{path}: sheet {section!r} has no column {missing[0]!r} in row {SYMBOL_ROW}; "

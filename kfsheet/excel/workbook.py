@@ -184,15 +184,24 @@ def _describe(book: Workbook, exercise: Exercise) -> None:
 
 
 def _stored_values(pages: list[Page]) -> dict[str, dict[str, Value]]:
-    """Values of formula cells by part of the zip; openpyxl numbers sheets in order."""
+    """Values of formula cells, and numbers of 17 digits, by part of the zip.
+
+    openpyxl numbers sheets in order, and writes 16 digits.
+    """
     return {
         f"xl/worksheets/sheet{n}.xml": {
-            f"{get_column_letter(column)}{row}": piece.stored
+            f"{get_column_letter(column)}{row}": (
+                piece.stored if is_formula(piece.content) else piece.content
+            )
             for (row, column), piece in page.pieces.items()
-            if is_formula(piece.content)
+            if is_formula(piece.content) or _shortened(piece.content)
         }
         for n, page in enumerate(pages, 1)
     }
+
+
+def _shortened(content: object) -> bool:
+    return isinstance(content, float) and float(f"{content:.16g}") != content
 
 
 def is_formula(content: object) -> bool:

@@ -1,0 +1,444 @@
+"""A tennis ball before two cameras: triangulation, an extended Kalman filter, and the impact.
+
+Camera 1 sees the whole flight from behind, camera 2 eight images of it from the side. The filter
+takes every pixel by itself, so that an image of one camera alone is worth what it is worth.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from sympy import Expr, Matrix, Min, Piecewise, S, Symbol, diag, floor, sqrt, zeros
+
+from kfsheet.charts import Chart, Series
+from kfsheet.exercise import Exercise, Question
+from kfsheet.expressions import (
+    RMS,
+    Count,
+    Last,
+    Mean,
+    Missing,
+    Observed,
+    Sum,
+    SumProduct,
+    t,
+    when_observed,
+)
+from kfsheet.kalman import Intermediate, Observation, State, StateSpace, add_filter
+from kfsheet.recurrence import Recurrence
+from kfsheet.tennis.cameras import FOCAL_LENGTH, PIXELS
+from kfsheet.tennis.dynamics import GRAVITY
+from kfsheet.tennis.sheets import add_cameras, add_centroid
+from kfsheet.tennis.shots import DRIVE, SIGMA, TOSS, Scene, Shot, read_shot
+
+DATA = Path(__file__).parent / "data"
+AXES = {1: "away from camera 1", 2: "away from camera 2", 3: "up"}
+PHOTOS = {
+    # pixel: words, camera, its coordinate
+    "u1": ("camera 1, pixels to the right", 1, 0),
+    "v1": ("camera 1, pixels down", 1, 1),
+    "u2": ("camera 2, pixels to the right", 2, 0),
+    "v2": ("camera 2, pixels down", 2, 1),
+}
+
+
+def read_drive() -> Shot:
+    """Shot A, a drive: 101 images, of which camera 2 has eight."""
+    return read_shot(DATA / "tennis_drive.csv", DRIVE)
+
+
+def read_toss() -> Shot:
+    """Shot B, a slow toss, photographed likewise."""
+    return read_shot(DATA / "tennis_toss.csv", TOSS)
+
+
+def build_model(shot: Shot | None = None, name: str = "tennis") -> Recurrence:
+    """The tennis ball, from the placing of the cameras to the impact.
+
+    Parameters
+    ----------
+    shot : Shot, optional
+        Photos, truth and cameras; the drive by default.
+    name : str
+        Name of the recurrence and of its workbook.
+    """
+    shot = shot or read_drive()
+    m = Recurrence(name, title="A tennis ball before two cameras", step="image")
+    _parameters(m, shot.scene)
+    add_cameras(m)
+    add_centroid(m)
+    _photos(m, shot)
+    _triangulation(m)
+    _start(m)
+    add_filter(m, flight_model(m), section="Kalman filter")
+    _flight(m)
+    _errors(m, shot)
+    return m
+
+
+def _parameters(m: Recurrence, scene: Scene) -> None:
+    dt = m.parameter("dt", 0.01, "s", "time between two images", sign="positive")
+    m.parameter("g", GRAVITY, "m/s2", "gravity")
+    m.parameter("kappa", scene.ball.kappa, "1/m", "drag c_D/m", sign="nonnegative")
+    for k, value in enumerate(scene.ball.spin, 1):
+        m.parameter(f"lambda_{k}", value, "1/s", f"lift c_L Omega/m, component {k}")
+    m.parameter("f_px", FOCAL_LENGTH, "px", "focal length of both cameras", sign="positive")
+    m.parameter("u_c", PIXELS / 2, "px", "pixel straight ahead, in u and in v")
+    for k, camera in ((1, scene.camera_1), (2, scene.camera_2)):
+        for axis, value in zip("xyz", camera.position, strict=True):
+            m.parameter(f"c{k}_{axis}", value, "m", f"camera {k}, position {axis}")
+    m.parameter("sigma_px", SIGMA, "px", "error of a pixel", sign="positive")
+    m.parameter("s_x", 0.1, "m", "start, claimed error of the position", sign="positive")
+    m.parameter("s_v", 1, "m/s", "start, claimed error of the velocity", sign="positive")
+    m.parameter("Phi_s", 0, "m2/s3", "noise of the model, spectral density", sign="nonnegative")
+    m.parameter("h_fly", 0.01, "s", "longest step of the flight to the ground", sign="positive")
+    m.time(t * dt, "s", "time since the first image")
+
+
+def _push(m: Recurrence, v: list[Expr], speed: Expr) -> list[Expr]:
+    """Equation (3.1) over m: acceleration by drag, spin and gravity."""
+    kappa, g = m["kappa", "g"]
+    spin = Matrix(m["lambda_1", "lambda_2", "lambda_3"])
+    return list(-kappa * speed * Matrix(v) + spin.cross(Matrix(v)) - Matrix([0, 0, g]))
+
+
+def _length(v: list[Expr]) -> Expr:
+    return sqrt(sum(component**2 for component in v))
+
+
+def _photos(m: Recurrence, shot: Shot) -> None:
+    for name, (words, camera, way) in PHOTOS.items():
+        pixels = (shot.pixels_1, shot.pixels_2)[camera - 1][:, way]
+        m.data(name, pixels, "px", words, section="Photos", may_be_missing=True)
+
+
+def _triangulation(m: Recurrence) -> None:
+    page, f, u_c = "Triangulation", *m["f_px", "u_c"]
+    slopes = m.columns("p1", "q1", "p2", "q2", section=page)
+    ways = {"u1": -1, "v1": -1, "u2": 1, "v2": -1}  # right is -x2 for camera 1, +x1 for camera 2
+    for slope, (name, way) in zip(slopes, ways.items(), strict=True):
+        seen, words = m[name][t], f"slope of the line of sight, from {name}"
+        m.define(slope[t], when_observed(seen, way * (seen - u_c) / f), "", words)
+    p1, q1, p2, q2 = (slope[t] for slope in slopes)
+    one, two = Matrix([1, p1, q1]), Matrix([p2, 1, q2])
+    c1, c2 = (Matrix(m[f"c{k}_x", f"c{k}_y", f"c{k}_z"]) for k in (1, 2))
+    both = (p1, q1, p2, q2)
+    products = {
+        "a11": (one.dot(one), "", "line 1 times itself"),
+        "a12": (one.dot(two), "", "line 1 times line 2"),
+        "a22": (two.dot(two), "", "line 2 times itself"),
+        "b1": (one.dot(c2 - c1), "m", "line 1 times the way from camera 1 to camera 2"),
+        "b2": (two.dot(c2 - c1), "m", "line 2 times that way"),
+    }
+    a11, a12, a22, b1, b2 = (column[t] for column in m.columns(*products, section=page))
+    for name, (rule, unit, words) in products.items():
+        m.define(m[name][t], when_observed(both, rule), unit, words)
+    s1, s2 = m.columns("s1", "s2", section=page)
+    known, spread = (a11, a12, a22, b1, b2), a11 * a22 - a12**2
+    rule_1, rule_2 = (a22 * b1 - a12 * b2) / spread, (a12 * b1 - a11 * b2) / spread
+    m.define(s1[t], when_observed(known, rule_1), "m", "how far along line 1 the closest point is")
+    m.define(s2[t], when_observed(known, rule_2), "m", "the same for line 2")
+    ends = {}
+    for k, corner, line, s in ((1, c1, one, s1), (2, c2, two, s2)):
+        for n in AXES:
+            (end,) = m.columns(f"y{k}_{n}", section=page)
+            asked = tuple(cell for cell in (s[t], line[n - 1]) if cell.args)
+            rule, words = corner[n - 1] + s[t] * line[n - 1], f"closest point of line {k}"
+            m.define(end[t], when_observed(asked, rule), "m", f"{words}, x{n}")
+            ends[k, n] = end[t]
+    for n, words in AXES.items():
+        (x,) = m.columns(f"x{n}_tri", section=page)
+        pair = (ends[1, n], ends[2, n])
+        m.define(x[t], when_observed(pair, sum(pair) / 2), "m", f"triangulated, {words}")
+    (gap,) = m.columns("gap", section=page)
+    apart = [ends[1, n] - ends[2, n] for n in AXES]
+    m.define(gap[t], when_observed(tuple(ends.values()), _length(apart)), "m", "between the lines")
+    m.summary("rms_gap", RMS(gap), "m", "root mean square of the gap")
+
+
+def _start(m: Recurrence) -> None:
+    """Position and velocity at t = 0 from a parabola through the triangulated points.
+
+    The slope through points at even times is the velocity at their middle; drag, spin and gravity
+    at that velocity bend the parabola.
+    """
+    when, off = m.columns("time_tri", "time_off", section="Triangulation")
+    seen = when_observed(m["x1_tri"][t], m.clock.base[t])
+    m.define(when[t], seen, "s", "time of the image, where both cameras have it")
+    n = m.summary("n_tri", Count(when), "", "images that both cameras have")
+    t_m = m.summary("t_mid", Mean(when), "s", "middle of their times")
+    # Times since the middle: sums of products of times since 0 would cancel, and lose digits.
+    m.define(off[t], when_observed(when[t], when[t] - t_m), "s", "time since the middle of those")
+    spread = m.summary("t_var", SumProduct(off, off) / n, "s2", "variance of those times")
+    middle, slope = [], []
+    for k in AXES:
+        x = m[f"x{k}_tri"]
+        middle.append(m.summary(f"x{k}_mid", Mean(x), "m", f"mean of x{k}_tri"))
+        # The times since the middle sum up to rounding errors only; they must not meet 5 m.
+        rule = (SumProduct(off, x) - Sum(off) * middle[-1]) / (n * spread)
+        slope.append(m.summary(f"v{k}_mid", rule, "m/s", f"slope of x{k}_tri"))
+    for k, bend in zip(AXES, _push(m, slope, _length(slope)), strict=True):
+        a = m.summary(f"a{k}_mid", bend, "m/s2", f"acceleration {k} at that velocity")
+        level = middle[k - 1] - slope[k - 1] * t_m + a * (t_m**2 - spread) / 2
+        m.summary(f"x{k}_0", _rounded(level, m["s_x"]), "m", f"start, x{k}")
+        speed = _rounded(slope[k - 1] - a * t_m, m["s_v"])
+        m.summary(f"v{k}_0", speed, "m/s", f"start, velocity {k}")
+
+
+def _rounded(value: Expr, error: Expr) -> Expr:
+    """To a tenth of the error that is claimed: it claims no more.
+
+    Programs add in different orders. Rounded, the start is the same in all of them to the last
+    digit, which an innovation, a small difference of large pixels, would otherwise magnify.
+    """
+    return floor(10 * value / error + S.Half) * error / 10
+
+
+def flight_model(m: Recurrence) -> StateSpace:
+    """Position and velocity; a midpoint step of (3.1); a pixel as an observation.
+
+    v_m = v + a(v) dt/2,   x <- x + v_m dt,   v <- v + a(v_m) dt
+    """
+    dt, f, u_c, Phi_s, r = *m["dt", "f_px", "u_c", "Phi_s"], m["sigma_px"] ** 2
+    x = {k: Symbol(f"x{k}", real=True) for k in AXES}
+    v = {k: Symbol(f"vx{k}", real=True) for k in AXES}
+    state = {x[k]: State("m", words, m[f"x{k}_0"], m["s_x"] ** 2) for k, words in AXES.items()} | {
+        v[k]: State("m/s", f"velocity {w}", m[f"v{k}_0"], m["s_v"] ** 2) for k, w in AXES.items()
+    }
+    speed, speed_m = Symbol("speed", real=True), Symbol("speed_m", real=True)
+    half = {k: Symbol(f"vm{k}", real=True) for k in AXES}
+    at_half = [
+        v[k] + dt / 2 * a for k, a in zip(AXES, _push(m, list(v.values()), speed), strict=True)
+    ]
+    intermediates = {
+        speed: Intermediate("m/s", "speed at the start of the step", _length(list(v.values()))),
+        **{
+            half[k]: Intermediate("m/s", f"velocity in the middle of the step, {AXES[k]}", rule)
+            for k, rule in zip(AXES, at_half, strict=True)
+        },
+        speed_m: Intermediate("m/s", "speed in the middle", _length(list(half.values()))),
+    }
+    bend = _push(m, list(half.values()), speed_m)
+    transition = [x[k] + half[k] * dt for k in AXES]
+    transition += [v[k] + dt * a for k, a in zip(AXES, bend, strict=True)]
+    depth_1, depth_2 = x[1] - m["c1_x"], x[2] - m["c2_y"]
+    predicted = {
+        "u1": u_c - f * (x[2] - m["c1_y"]) / depth_1,
+        "v1": u_c - f * (x[3] - m["c1_z"]) / depth_1,
+        "u2": u_c + f * (x[1] - m["c2_x"]) / depth_2,
+        "v2": u_c - f * (x[3] - m["c2_z"]) / depth_2,
+    }
+    seen = [Observation(name, m[name][t], h, r, "px") for name, h in predicted.items()]
+    Q = diag(zeros(3, 3), *[Phi_s * dt] * 3)
+    return StateSpace(state, transition, Q, seen, intermediates)
+
+
+def _flight(m: Recurrence) -> None:
+    """Runge and Kutta's steps of (3.1) from the last analysis; the last steps end on the ground.
+
+    A step is no longer than the time to the ground by the present acceleration, so that the rows
+    close in on the impact and then stay there.
+    """
+    page = "Flight"
+    m.rows_are(page, "step")
+    last = {}
+    for k, words in AXES.items():
+        for name, unit, what in ((f"x{k}", "m", ""), (f"vx{k}", "m/s", "velocity ")):
+            rule, words_of = Last(m[f"{name}_a"]), f"last analysis: {what}{words}"
+            last[name] = m.summary(f"{name}_end", rule, unit, words_of)
+    clock, h = m.columns("t_fly", "h_step", section=page)
+    x = m.columns("x1_fly", "x2_fly", "x3_fly", section=page)
+    v = m.columns("v1_fly", "v2_fly", "v3_fly", section=page)
+    stages = _stages(m, page, [c[t] for c in v], h[t])
+    fall, height = -stages[0][1][2], x[2][t] - m["r_ball"]
+    reach = (v[2][t] + sqrt(v[2][t] ** 2 + 2 * fall * height)) / fall
+    m.define(h[t], Min(m["h_fly"], reach), "s", "step: to the ground at most")
+    before = [[e.xreplace({t: t - 1}) for e in (*w, *a)] for w, a in stages]
+    step, weights = h[t - 1], (1, 2, 2, 1)
+    for k in AXES:
+        for n, column, name, unit, words in (
+            (k - 1, x[k - 1], f"x{k}", "m", AXES[k]),
+            (k + 2, v[k - 1], f"vx{k}", "m/s", f"velocity {AXES[k]}"),
+        ):
+            slope = sum(b * s[n] for b, s in zip(weights, before, strict=True)) / 6
+            m.define(column[t], column[t - 1] + step * slope, unit, words, start=[last[name]])
+    m.define(clock[t], clock[t - 1] + step, "s", "time since the last image", start=[0])
+    m.summary(
+        "impact_time", Last(m.clock.base) + Last(clock), "s", "impact: time since the first image"
+    )
+    for k in AXES:
+        m.summary(f"impact_x{k}", Last(x[k - 1]), "m", f"impact: x{k}")
+
+
+def _stages(
+    m: Recurrence, page: str, v: list[Expr], h: Expr
+) -> list[tuple[list[Expr], list[Expr]]]:
+    """The four velocities of a step and the accelerations that belong to them, as cells."""
+    found = []
+    for stage, share in enumerate((0, h / 2, h / 2, h), 1):
+        if stage > 1:
+            names = m.columns(*(f"w{stage}_{k}" for k in AXES), section=page)
+            for name, start, a in zip(names, v, found[-1][1], strict=True):
+                m.define(name[t], start + share * a, "m/s", f"velocity at stage {stage}")
+            now = [name[t] for name in names]
+        else:
+            now = v
+        (speed,) = m.columns(f"speed_{stage}", section=page)
+        m.define(speed[t], _length(now), "m/s", f"speed at stage {stage}")
+        rates = m.columns(*(f"k{stage}_{k}" for k in AXES), section=page)
+        for name, rule in zip(rates, _push(m, now, speed[t]), strict=True):
+            m.define(name[t], rule, "m/s2", f"acceleration at stage {stage}")
+        found.append((now, [name[t] for name in rates]))
+    return found
+
+
+def _errors(m: Recurrence, shot: Shot) -> None:
+    page = "Errors"
+    for k, words in AXES.items():
+        true = m.data(f"x{k}_true", shot.truth[:, k - 1], "m", f"truth, {words}", section=page)
+        for run, what in (("tri", "triangulation"), ("a", "filter")):
+            (e,) = m.columns(f"e_{run}_x{k}", section=page)
+            estimate = m[f"x{k}_{run}"][t]
+            error = estimate - true[t]
+            seen = when_observed(estimate, error) if run == "tri" else error
+            m.define(e[t], seen, "m", f"error of x{k}, {what}")
+            m.summary(f"rms_{run}_x{k}", RMS(e), "m", f"rms error of x{k}, {what}")
+            if run == "a":
+                m.summary(f"end_x{k}", Last(e), "m", f"error of x{k} in the last image, filter")
+    for name in PHOTOS:
+        variance = m["S_u1" if name == "u1" else f"S_{name}_f"][t]
+        low, high = m.columns(f"d_{name}_low", f"d_{name}_high", section=page)
+        # The band of the start, hundreds of pixels wide, would make the chart of the rest a line.
+        settled = variance < 12 * m["sigma_px"] ** 2
+        band = Piecewise(
+            (2 * sqrt(variance), Observed(m[f"d_{name}"][t]) & settled), (Missing, True)
+        )
+        words = f"band of d_{name}, once it is narrow"
+        m.define(high[t], band, "px", f"{words}: +2 sigma", start=[Missing])
+        m.define(low[t], when_observed(high[t], -high[t]), "px", f"{words}: -2 sigma")
+    (seen,) = m.columns("n_seen", section=page)
+    number = sum(when_observed(m[name][t], 1, 0) for name in PHOTOS)
+    m.define(seen[t], number, "", "pixels that the filter was given", start=[0])
+    ratio = Sum(m["NIS"]) / Sum(seen)
+    m.summary("mean_NIS", ratio, "", "NIS for one pixel; an honest filter: 1")
+
+
+tennis = build_model()
+
+ABOUT = (
+    "A tennis ball flies away from camera 1, which takes 101 images of it in a second. Camera 2 at "
+    "the side has it in images 5 to 12 only. Each pixel errs by 0.2 px. Where is the ball in the "
+    "other images, and where will it come down?",
+    "Triangulation needs both cameras. The filter (sheet Kalman filter) takes every pixel by "
+    "itself, up to four in an image, and carries position and velocity by the equation of the "
+    "flight with drag and spin. The sheet Flight goes on from its last analysis to the ground.",
+    "Try this: on the sheet Parameters, set kappa to 0.0186 (drag measured 10 % too low): the "
+    "innovations of camera 1 leave their band, mean_NIS rises, and the impact moves. Or delete the "
+    "photos of camera 2 from image 7 on, and see what the depth x1 then is worth.",
+    "The sheets Cameras and Centroid are calculators: where to put two cameras, and what light "
+    "from the side does to the centre of intensity of a ball eight pixels wide (phi, ambient, "
+    "albedo, wall, threshold). Geometry, noise and ball are ours: the source prints none.",
+)
+SECTIONS = {
+    "Cameras": "the error diamond of two lines of sight, for each angle",
+    "Centroid": "a shaded ball of 8 pixels, pixel by pixel, and its centre of intensity",
+    "Photos": "pixels of both cameras; an empty cell is a photo that is missing",
+    "Triangulation": "closest points of two lines of sight, the midpoint and the gap",
+    "Kalman filter": "a midpoint step of the flight, then up to four pixels, one after the other",
+    "Flight": "steps of Runge and Kutta from the last analysis to the ground",
+    "Errors": "estimates minus truth, and the bands that the filter claims for its innovations",
+}
+
+
+def _path(title: str, k: int, label: str, note: str) -> Chart:
+    series = (
+        Series("x1_true", f"x{k}_true", "truth", "truth"),
+        Series("x1_tri", f"x{k}_tri", "triangulation", "observation"),
+        Series("x1_a", f"x{k}_a", "filter", "line"),
+        Series("x1_fly", f"x{k}_fly", "to the ground", "free"),
+    )
+    return Chart(title, "x1: away from camera 1 (m)", label, series, note)
+
+
+def _innovations(name: str, role: str, note: str) -> Chart:
+    band = "second band" if role == "second" else "band"
+    series = (
+        Series("time", f"d_{name}", f"innovation d_{name}", role),
+        Series("time", f"d_{name}_low", "", band),
+        Series("time", f"d_{name}_high", "2 sigma band", band),
+    )
+    return Chart(f"Innovations of {name}", "time (s)", "observed - forecast (px)", series, note)
+
+
+CHARTS = (
+    _path("Side view", 3, "x3: height (m)", "The flight from the side, and on to the ground."),
+    _path("Top view", 2, "x2: away from camera 2 (m)", "From above; x2 is stretched."),
+    Chart(
+        "What the cameras see",
+        "u: to the right (px)",
+        "v: down (px)",
+        (Series("u1", "v1", "camera 1", "first"), Series("u2", "v2", "camera 2", "second")),
+        note="The whole flight fills a narrow strip of camera 1; camera 2 has eight images.",
+        origin_top_left=True,
+    ),
+    Chart(
+        "Errors of x1, the depth",
+        "time (s)",
+        "estimate - truth (m)",
+        (
+            Series("time", "e_tri_x1", "triangulation", "observation"),
+            Series("time", "e_a_x1", "filter", "line"),
+        ),
+        note="What both cameras knew early, the equation of the flight carries on.",
+    ),
+    _innovations("u1", "first", "An honest filter: 19 of 20 inside the band."),
+    _innovations("v1", "second", "The same for the vertical pixel."),
+    _innovations("u2", "first", "Camera 2: eight images."),
+    _innovations("v2", "second", "The same for its vertical pixel."),
+    Chart(
+        "Where to put the cameras",
+        "theta (rad)",
+        "m",
+        (
+            Series("theta", "H", "H, along", "line"),
+            Series("theta", "V", "V, across", "second line"),
+            Series("theta", "rms_cross", "rms", "free"),
+        ),
+        note="Diagonals of the error diamond, and the rms error: their minima differ.",
+    ),
+    Chart(
+        "A ball lit from the side",
+        "pixel to the right (px)",
+        "brightness",
+        (Series("i_px", "light", "all lines of the image", "observation"),),
+        note="Each point is a pixel. The centre of intensity moves to the light.",
+    ),
+)
+QUESTIONS = (
+    Question("d_max", 1, "A pixel sees alpha/R; eight of them must fit into the ball."),
+    Question("p1", 1, "Right is -x2 for camera 1; mind the sign."),
+    Question("s1", 3, "Both closest points: the connecting line is orthogonal to both lines."),
+    Question("x1_tri", 1, "The middle of the closest points."),
+    Question("vm1", 2, "Velocity after half a step: drag, spin."),
+    Question("x1_f", 1, "One step with the velocity of its middle."),
+    Question("vx3_f", 2, "One step with the acceleration of its middle; mind gravity."),
+    Question("d_u1", 2, "Observed minus predicted pixel."),
+    Question("H_u1_x1", 2, "Derivative of the pixel with respect to the depth."),
+    Question("w2_1", 1, "Velocity after half a step with the first acceleration."),
+)
+
+
+def exercise_of(model: Recurrence) -> Exercise:
+    """The exercise of a shot: the same words, charts and questions."""
+    return Exercise(
+        model=model,
+        about=ABOUT,
+        source="Workshop report, chapter 3: The Tennis Ball Problem",
+        charts=CHARTS,
+        questions=QUESTIONS,
+        notebook="notebooks/04_tennis.ipynb",
+        sections=SECTIONS,
+    )
+
+
+exercise = exercise_of(tennis)

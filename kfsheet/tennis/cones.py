@@ -1,0 +1,81 @@
+"""Error cones: the nearest point that agrees with a photo, or with two (section 3.6.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kfsheet.errors import DataError
+from kfsheet.tennis.cameras import Camera
+from kfsheet.tennis.inputs import Array, array, number
+
+ROUNDS, CLOSE = 10_000, 1e-9  # of Dykstra's algorithm, and its tolerance in m
+
+
+@dataclass(frozen=True)
+class Cones:
+    """Circular cones of one camera, one for each photo.
+
+    Parameters
+    ----------
+    apex : ndarray
+        (3,) the pinhole, m.
+    axes : ndarray
+        (n, 3) unit vectors; NaN where there is no photo: all of space.
+    half_angle : float
+        Between axis and surface, rad, below pi/2.
+    """
+
+    apex: Array
+    axes: Array
+    half_angle: float
+
+    @classmethod
+    def of(cls, camera: Camera, pixels: ArrayLike, radius: float) -> Cones:
+        """The cones around lines of sight, ``radius`` pixels wide at the middle of the image."""
+        angle = np.arctan(number("radius", radius, 0) / camera.f)
+        return cls(np.array(camera.position, float), camera.rays(pixels), float(angle))
+
+    def project(self, x: ArrayLike) -> Array:
+        """The nearest points (n, 3) of the cones to points (n, 3).
+
+        With q = x - apex, its part s along the axis and its distance r from it: q lies inside if
+        r <= s tan(angle). Else the nearest generator has the direction
+        e = cos(angle) axis + sin(angle) across, and the nearest point on it lies at max(0, q.e).
+        """
+        x = array("x", x, self.axes.shape)
+        q = x - self.apex
+        s = (q * self.axes).sum(-1, keepdims=True)
+        across = q - s * self.axes
+        r = np.linalg.norm(across, axis=-1, keepdims=True)
+        across = across / np.where(r > 0, r, 1)
+        generator = np.cos(self.half_angle) * self.axes + np.sin(self.half_angle) * across
+        reach = np.maximum(0, (q * generator).sum(-1, keepdims=True))
+        outside = r > s * np.tan(self.half_angle)  # False where there is no photo
+        return np.where(outside, self.apex + reach * generator, x)
+
+
+def project_on_both(one: Cones, two: Cones, x: ArrayLike) -> Array:
+    """The nearest points (n, 3) of the intersections of two cones, by Dykstra's algorithm.
+
+    Projecting in turn on one and the other would end in *some* common point. Dykstra carries
+    along what each projection took away, and ends in the nearest.
+
+    Raises
+    ------
+    DataError
+        If two cones do not meet.
+    """
+    x = array("x", x, one.axes.shape)
+    taken_1, taken_2 = np.zeros_like(x), np.zeros_like(x)
+    for _ in range(ROUNDS):
+        y = one.project(x + taken_1)
+        taken_1 = x + taken_1 - y
+        x = two.project(y + taken_2)
+        taken_2 = y + taken_2 - x
+        if np.abs(x - y).max() < CLOSE:
+            return x
+    k = int(np.abs(x - y).max(axis=-1).argmax())
+    raise DataError(f"the error cones of image {k} do not meet; make the radius larger")

@@ -1,0 +1,243 @@
+"""The iterative method of section 3.6, as the report prints it: depths invented, then believed.
+
+First a flight without spin through the triangulated points. Then, again and again: move each
+computed position to the nearest point that agrees with the photos (:mod:`kfsheet.tennis.cones`),
+and fit the closed form (3.5) to those points, with weights, in eleven parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from kfsheet.errors import DataError
+from kfsheet.tennis.closed_form import closed_form
+from kfsheet.tennis.cones import Cones, project_on_both
+from kfsheet.tennis.dynamics import GRAVITY, MASS, TEXTBOOK_DRAG, Ball
+from kfsheet.tennis.inputs import Array, number
+from kfsheet.tennis.shots import Shot
+
+SCALE = np.array([1, 1, 1, 10, 10, 10, 0.1, 0.1, 0.1, 0.01, 10])
+"""Size of X, V, lambda, c_D/m and g, to make the parameters of the fit of order 1."""
+STEP, THIN = 1e-5, 1e-9  # of derivatives, in those sizes; and of a cone that is a ray, px
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """One turn of the loop.
+
+    Parameters
+    ----------
+    n : int
+        Number of the turn; 0 is the first estimate.
+    ball : Ball
+        Parameters that the fit found.
+    x : ndarray
+        (images, 3) positions of the fit, m.
+    pseudo : ndarray
+        The same, moved into the error cones: what the next turn believes.
+    moved : float
+        Root mean square change of ``x`` since the turn before, m.
+    """
+
+    n: int
+    ball: Ball
+    x: Array
+    pseudo: Array
+    moved: float
+
+
+@dataclass(frozen=True)
+class Loop:
+    """What the loop did, and why it stopped: 'g', 'stable' or 'limit'."""
+
+    turns: list[Iteration]
+    reason: str
+
+    @property
+    def last(self) -> Iteration:
+        """The last turn."""
+        return self.turns[-1]
+
+
+def into_cones(shot: Shot, x: Array, radius: float) -> Array:
+    """Positions (images, 3), each moved to the nearest that lies in the error cones of its photos.
+
+    Parameters
+    ----------
+    shot : Shot
+        The photos.
+    x : ndarray
+        (images, 3), m.
+    radius : float
+        Of the cones, px.
+    """
+    cameras, pixels = (
+        (shot.scene.camera_1, shot.scene.camera_2),
+        (shot.pixels_1, shot.pixels_2),
+    )
+    one, two = (Cones.of(c, p, radius) for c, p in zip(cameras, pixels, strict=True))
+    both = shot.overlap
+    moved = two.project(one.project(x))  # in most images one of the two is all of space
+    pair = (Cones(c.apex, c.axes[both], c.half_angle) for c in (one, two))
+    moved[both] = project_on_both(*pair, x[both])
+    return moved
+
+
+def weights(shot: Shot, x: Array) -> Array:
+    """The report's weights (images,), which sum up to 1.
+
+    C_2/2 before the overlap, C_2 in it, and C_2 x1(b)/x1(k) in the images k after it, of which b
+    is the first.
+    """
+    first, last = shot.overlap[[0, -1]]
+    w = np.ones(len(x))
+    w[:first] = 0.5
+    if last + 1 < len(x):
+        w[last + 1 :] = x[last + 1, 0] / x[last + 1 :, 0]
+    return w / w.sum()
+
+
+def first_estimate(shot: Shot, g: float = GRAVITY) -> Ball:
+    """Section 3.6.1: X and V of (3.5) without spin, with the textbook's drag, from the overlap.
+
+    Raises
+    ------
+    DataError
+        If there are fewer than three triangulated points.
+    """
+    seen, points = shot.overlap, shot.triangulated()
+    if len(seen) < 3:
+        raise DataError("the loop begins with triangulated points, and needs at least three")
+    kappa = TEXTBOOK_DRAG / MASS
+
+    def residuals(p: Array) -> Array:
+        x = closed_form(shot.times[seen], p[:3], p[3:], kappa, np.zeros(3), g)
+        return (x - points[seen]).ravel()
+
+    slope, level = np.polyfit(shot.times[seen], points[seen], 1)
+    found = least_squares(residuals, [*level, *slope], method="lm", x_scale=SCALE[:6])
+    return Ball(found.x[:3], found.x[3:], kappa, np.zeros(3), g)
+
+
+def _vector(ball: Ball) -> Array:
+    return np.concatenate([ball.X, ball.V, ball.spin, [ball.kappa, ball.g]]) / SCALE
+
+
+def fit_closed_form(times: Array, x: Array, w: Array, start: Ball) -> Ball:
+    """Weighted least squares of (3.5) in eleven parameters: X, V, lambda, c_D/m and g.
+
+    Parameters
+    ----------
+    times, x, w : ndarray
+        (n,), (n, 3) and (n,): the sum of w |x - (3.5)|^2 is made least.
+    start : Ball
+        Where to begin.
+    """
+    root = np.sqrt(w)[:, None]
+
+    def residuals(p: Array) -> Array:
+        p = p * SCALE
+        return ((closed_form(times, p[:3], p[3:6], p[9], p[6:9], p[10]) - x) * root).ravel()
+
+    p = _vector(start)
+    p = least_squares(residuals, p, method="lm", xtol=1e-12, ftol=1e-12).x * SCALE
+    return Ball(p[:3], p[3:6], p[9], p[6:9], p[10])
+
+
+def iterate(
+    shot: Shot,
+    *,
+    radius: float = 0.6,
+    g: float = GRAVITY,
+    limit: int = 20,
+    g_tolerance: float = 0.0,
+    stable: float = 0.0,
+) -> Loop:
+    """Run the loop of section 3.6.
+
+    Parameters
+    ----------
+    shot : Shot
+        The photos.
+    radius : float
+        Of the error cones, px.
+    g : float
+        Gravity of the first estimate, m/s2; afterwards it is fitted.
+    limit : int
+        Largest number of turns.
+    g_tolerance : float
+        Stop when the fitted g is that near to 9.8, m/s2; section 3.6.3.
+    stable : float
+        Stop when the positions move by less, root mean square, m.
+
+    Raises
+    ------
+    DataError
+        If an argument is out of range, or the error cones of an image do not meet.
+    """
+    if not isinstance(limit, int) or limit < 1:
+        raise DataError(f"limit is {limit!r}; give a whole number of turns from 1 up")
+    number("g_tolerance", g_tolerance, -1), number("stable", stable, -1)
+    ball, turns, reason = first_estimate(shot, g), [], "limit"
+    for n in range(limit + 1):
+        if turns:
+            believed = turns[-1].pseudo
+            ball = fit_closed_form(shot.times, believed, weights(shot, believed), ball)
+        x = closed_form(shot.times, ball.X, ball.V, ball.kappa, ball.spin, ball.g)
+        moved = np.sqrt(np.mean((x - turns[-1].x) ** 2)) if turns else np.inf
+        turns.append(Iteration(n, ball, x, into_cones(shot, x, radius), float(moved)))
+        if n and abs(ball.g - GRAVITY) < g_tolerance:
+            reason = "g"
+        elif moved < stable:
+            reason = "stable"
+        if reason != "limit":
+            break
+    return Loop(turns, reason)
+
+
+def modes(shot: Shot, ball: Ball) -> Array:
+    """What is left, after one turn, of a small change of the eleven parameters: the eigenvalues.
+
+    A fit of pseudo-positions y to (3.5) with the Jacobian J turns a change dy into
+    dp = (J'WJ)^-1 J'W dy, and a change dp moves the pseudo-positions by D dp. Cones as thin as
+    rays are the best case: within a cone a point stays where it is, and nothing is corrected.
+
+    Parameters
+    ----------
+    shot : Shot
+        The photos.
+    ball : Ball
+        Where the loop has settled.
+
+    Returns
+    -------
+    ndarray
+        (11,) moduli of the eigenvalues of (J'WJ)^-1 J'W D, the largest first; the loop forgets a
+        mode the faster, the smaller it is, and one of 1 never.
+    """
+    rays = Cones.of(shot.scene.camera_1, shot.pixels_1, THIN)
+    both, seen = shot.overlap, shot.triangulated()
+
+    def positions(p: Array) -> Array:
+        p = p * SCALE
+        return closed_form(shot.times, p[:3], p[3:6], p[9], p[6:9], p[10])
+
+    def believed(p: Array) -> Array:
+        x = rays.project(positions(p))
+        x[both] = seen[both]
+        return x
+
+    def derivative(function: Callable[[Array], Array], p: Array) -> Array:
+        steps = STEP * np.eye(len(p))
+        pairs = [(function(p + e) - function(p - e)).ravel() for e in steps]
+        return np.array(pairs).T / (2 * STEP)
+
+    p = _vector(ball)
+    root = np.repeat(np.sqrt(weights(shot, positions(p))), 3)[:, None]
+    J, D = (derivative(function, p) * root for function in (positions, believed))
+    values = np.linalg.eigvals(np.linalg.lstsq(J, D, rcond=None)[0])
+    return np.sort(np.abs(values))[::-1]

@@ -1,0 +1,223 @@
+"""The tennis exercise: its cells against other algorithms, and the filter against the optimum."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from kfsheet import check_workbook, evaluate, write_workbook
+from kfsheet.evaluation import run
+from kfsheet.exercises.tennis import exercise, read_drive, read_toss, tennis
+from kfsheet.exercises.tennis_toss import tennis_toss
+from kfsheet.tennis.cameras import error_diamond, rms_error, triangulate
+from kfsheet.tennis.centroid import centroid, lambert_shift
+from kfsheet.tennis.dynamics import Ball, acceleration, impact
+from kfsheet.tennis.reprojection import fit_pixels
+from kfsheet.tennis.shots import TRUE_DRAG, TRUE_SPIN, simulate
+
+MODELS = {"A": (tennis, read_drive()), "B": (tennis_toss, read_toss())}
+STATE = ["x1", "x2", "x3", "vx1", "vx2", "vx3"]
+
+
+@pytest.fixture(scope="module")
+def frames():
+    return {name: evaluate(model) for name, (model, _) in MODELS.items()}
+
+
+@pytest.fixture(params=MODELS)
+def name(request):
+    return request.param
+
+
+def photos(shot):
+    p, q = shot.pixels_1.T, shot.pixels_2.T
+    return {"u1": p[0], "v1": p[1], "u2": q[0], "v2": q[1]}
+
+
+def test_units_agree():
+    assert tennis.check_units() == []
+
+
+def test_the_workbook_is_what_an_independent_engine_computes(tmp_path, engine):
+    report = check_workbook(write_workbook(exercise, tmp_path), exercise, engine)
+    assert report.holds, report.lines()[:3]
+    assert report.cells > 30_000
+
+
+def test_cells_triangulate_as_the_library_does(frames, name):
+    frame, (_, shot) = frames[name], MODELS[name]
+    s = shot.scene
+    x, gap = triangulate(s.camera_1, shot.pixels_1, s.camera_2, shot.pixels_2)
+    np.testing.assert_allclose(frame[["x1_tri", "x2_tri", "x3_tri"]], x, rtol=1e-12)
+    np.testing.assert_allclose(frame["gap"], gap, rtol=1e-9)
+
+
+def step(y, dt, drag, spin, g):
+    """The midpoint step, written with cross products."""
+    middle = y[3:] + dt / 2 * acceleration(y[3:], drag, spin, g)
+    return np.r_[y[:3] + dt * middle, y[3:] + dt * acceleration(middle, drag, spin, g)]
+
+
+def differences(function, y):
+    h = 1e-5
+    pairs = [(function(y + h * e) - function(y - h * e)) / (2 * h) for e in np.eye(len(y))]
+    return np.array(pairs).T
+
+
+def test_the_cells_are_an_extended_kalman_filter(frames, name):
+    """Joint updates with an inverse, and Jacobians by differences, from the same start."""
+    frame, (_, shot) = frames[name], MODELS[name]
+    cameras = (shot.scene.camera_1, shot.scene.camera_2)
+    y, P = frame.loc[0, [f"{n}_a" for n in STATE]].to_numpy(), np.diag([0.01] * 3 + [1.0] * 3)
+
+    def motion(y):
+        return step(y, 0.01, TRUE_DRAG, TRUE_SPIN, 9.8)
+
+    def seen(y):
+        return np.concatenate([camera.project(y[:3]) for camera in cameras])
+
+    for k in range(1, len(shot.times)):
+        F, y = differences(motion, y), motion(y)
+        P = F @ P @ F.T
+        d = np.r_[shot.pixels_1[k], shot.pixels_2[k]] - seen(y)
+        there = np.isfinite(d)
+        H = differences(seen, y)[there]
+        S = H @ P @ H.T + 0.04 * np.eye(len(H))
+        K = P @ H.T @ np.linalg.inv(S)
+        y, P = y + K @ d[there], P - K @ S @ K.T
+        np.testing.assert_allclose(frame.loc[k, [f"{n}_a" for n in STATE]], y, rtol=1e-7)
+        np.testing.assert_allclose(frame.loc[k, "P_x1x1_a"], P[0, 0], rtol=1e-5)
+        np.testing.assert_allclose(frame.loc[k, "P_x1vx1_a"], P[0, 3], rtol=1e-4, atol=1e-12)
+        assert frame.loc[k, "NIS"] == pytest.approx(d[there] @ np.linalg.solve(S, d[there]), 1e-5)
+
+
+def test_the_midpoint_step_is_near_enough_to_the_flight(name):
+    """A second of steps of 0.01 s against an ODE solver: less than a tenth of a millimetre."""
+    ball = MODELS[name][1].scene.ball
+    y = np.r_[ball.X, ball.V]
+    for _ in range(100):
+        y = step(y, 0.01, ball.kappa, ball.spin, ball.g)
+    assert np.abs(y[:3] - ball.fly([1.0])[0]).max() < 2e-4
+
+
+def test_the_flight_sheet_ends_where_an_ode_solver_does(frames, name):
+    frame = frames[name]
+    last = frame.loc[100, [f"{n}_a" for n in STATE]].to_numpy()
+    time, x = impact(Ball(last[:3], last[3:], TRUE_DRAG, TRUE_SPIN))
+    scalars = frame.attrs["scalars"]
+    assert scalars["impact_time"] == pytest.approx(1 + time, abs=1e-7)
+    assert [scalars[f"impact_x{k}"] for k in (1, 2, 3)] == pytest.approx(x, abs=1e-6)
+
+
+def test_the_steps_of_the_flight_are_runge_and_kuttas():
+    """One long step against many short ones; a method of order 2 would err visibly."""
+    frame = evaluate(tennis, h_fly=0.05)
+    y = frame.loc[0, ["x1_fly", "x2_fly", "x3_fly", "v1_fly", "v2_fly", "v3_fly"]].to_numpy()
+    fine = solve_ivp(
+        lambda _, y: np.r_[y[3:], acceleration(y[3:], TRUE_DRAG, TRUE_SPIN, 9.8)],
+        (0, 0.05),
+        y,
+        rtol=1e-12,
+        atol=1e-12,
+    ).y[:3, -1]
+    assert np.abs(frame.loc[1, ["x1_fly", "x2_fly", "x3_fly"]] - fine).max() < 1e-7
+    coarse = step(y, 0.05, TRUE_DRAG, TRUE_SPIN, 9.8)[:3]
+    assert np.abs(coarse - fine).max() > 1e-5
+
+
+def test_the_filter_comes_near_the_optimum_of_the_pixels(name):
+    """Q is 0, so the last analysis, flown backwards, is the smoothed path; 12 draws.
+
+    It errs as much as the least squares fit of all pixels that knows drag and spin too, and
+    differs from it by a fraction of that error.
+    """
+    model, shot = MODELS[name]
+    ours, best = [], []
+    for seed in range(12):
+        noisy = simulate(shot, seed)
+        columns, _, _ = run(model, photos(noisy))
+        last = np.array([columns[f"{n}_a"][-1] for n in STATE])
+        start = Ball(last[:3], last[3:], TRUE_DRAG, TRUE_SPIN).state(-1.0)
+        ours.append(start.fly(shot.times))
+        best.append(fit_pixels(noisy, kappa=TRUE_DRAG, spin=TRUE_SPIN).ball.fly(shot.times))
+
+    def rms(differences):
+        return np.sqrt(np.mean(np.square(differences), axis=(0, 1)))
+
+    ours, best = np.array(ours), np.array(best)
+    assert (rms(ours - shot.truth) < 1.15 * rms(best - shot.truth)).all()
+    assert (rms(ours - best) < 0.3 * rms(best - shot.truth)).all()
+
+
+def test_the_filter_errs_as_much_as_it_says(name):
+    """NIS by pixel, and the last error by its claimed covariance, over 20 draws."""
+    model, shot = MODELS[name]
+    ratios, nees = [], []
+    for seed in range(20):
+        columns, scalars, _ = run(model, photos(simulate(shot, seed)))
+        ratios.append(scalars["mean_NIS"])
+        e = np.array([columns[f"{n}_a"][-1] for n in STATE[:3]]) - shot.truth[-1]
+        P = np.array(
+            [[columns[f"P_{min(a, b)}{max(a, b)}_a"][-1] for a in STATE[:3]] for b in STATE[:3]]
+        )
+        nees.append(e @ np.linalg.solve(P, e))
+    assert np.mean(ratios) == pytest.approx(1, abs=0.05)
+    assert np.mean(nees) == pytest.approx(3, abs=1.7)  # three standard deviations
+
+
+def test_wrong_drag_shows_in_the_innovations():
+    """The filter cannot explain the pixels with the drag 10 % too low; nor without spin."""
+    scalars = evaluate(tennis).attrs["scalars"]
+    assert scalars["mean_NIS"] < 1.1
+    assert evaluate(tennis, kappa=0.0186).attrs["scalars"]["mean_NIS"] > 1.2
+    spinless = evaluate(tennis, lambda_1=0, lambda_2=0, lambda_3=0)
+    assert spinless.attrs["scalars"]["mean_NIS"] > 10
+
+
+def test_a_photo_that_is_missing_is_skipped():
+    data = photos(read_drive())
+    data = {n: np.where(np.arange(101) == 50, np.nan, v) for n, v in data.items()}
+    frame = evaluate(tennis, data)
+    for n in STATE:
+        assert frame.loc[50, f"{n}_a"] == frame.loc[50, f"{n}_f"]
+    assert np.isnan(frame.loc[50, "d_u1"])
+
+
+def test_without_camera_2_the_depth_is_worth_little():
+    """From image 8 on: the claimed error of x1 grows tenfold within the shot."""
+    shot = read_drive()
+    alone = replace(shot, pixels_2=np.where(np.arange(101)[:, None] < 8, shot.pixels_2, np.nan))
+    both, one = evaluate(tennis), evaluate(tennis, photos(alone))
+    assert one["P_x1x1_a"].iloc[-1] > 4 * both["P_x1x1_a"].iloc[-1]
+
+
+def test_the_cameras_sheet_is_the_library(frames):
+    frame = frames["A"]
+    H, V = error_diamond(frame["theta"])
+    np.testing.assert_allclose(frame["H"], H)
+    np.testing.assert_allclose(frame["V"], V)
+    np.testing.assert_allclose(frame["rms_cross"], rms_error(frame["theta"]))
+    scalars = frame.attrs["scalars"]
+    assert scalars["d_max"] == pytest.approx(10.4167, abs=5e-5)
+    assert np.degrees(scalars["theta_best"]) == pytest.approx(45.024, abs=5e-4)
+    assert np.degrees(scalars["apex_best"]) == pytest.approx(109.47, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    "light", [{}, {"phi": 30}, {"ambient": 0.4, "wall": 0.3, "threshold": 0.1}]
+)
+def test_the_centroid_sheet_is_the_library(light):
+    """The cells sample each pixel once; the library's centroid gets the same image."""
+    frame = evaluate(tennis, **light)
+    image = frame["light"].iloc[:100].to_numpy().reshape(10, 10)
+    found = centroid(image, light.get("wall", 0.0), light.get("threshold", 0.0))
+    scalars = frame.attrs["scalars"]
+    assert [scalars["i_centroid"], scalars["j_centroid"]] == pytest.approx(found)
+
+
+def test_the_centroid_sheet_shows_the_shift():
+    for phi in (30, 60, 90):
+        scalars = evaluate(tennis, phi=phi).attrs["scalars"]
+        assert scalars["shift_theory"] == pytest.approx(lambert_shift(np.radians(phi)))
+        assert scalars["shift_i"] == pytest.approx(scalars["shift_theory"], abs=0.03)
