@@ -15,7 +15,7 @@ from openpyxl.utils import get_column_letter
 
 from kfsheet.checks import columns_read
 from kfsheet.evaluation import run
-from kfsheet.excel.layout import FIRST_ROW, PARAMETER_ROW, Layout, quote
+from kfsheet.excel.layout import FIRST_ROW, PARAMETER_ROW, Layout, chart_place, quote
 from kfsheet.excel.styles import LEGEND, number_format
 from kfsheet.exercise import Exercise
 from kfsheet.expressions import Missing
@@ -191,6 +191,8 @@ def charts_page(exercise: Exercise, layout: Layout, now: Run) -> Page:
     """The worksheet of charts, with a copy of each column that a chart could misread."""
     page = Page("Charts")
     page.put(1, 1, exercise.title, "title")
+    for number, chart in enumerate(exercise.charts):
+        page.put(*chart_place(number), chart.note, "note")
     names = plotted(exercise)
     if names:
         page.put(2, 1, "The columns from AA on are plotted where a value may be missing.")

@@ -20,12 +20,17 @@ from openpyxl.workbook import Workbook
 
 from kfsheet.charts import LOOKS, Chart, Look, Series
 from kfsheet.excel.compose import chart_range
-from kfsheet.excel.layout import FIRST_ROW, Layout
+from kfsheet.excel.layout import (
+    CHART_COLUMNS,
+    FIRST_CHART_ROW,
+    FIRST_ROW,
+    ROWS_A_CHART,
+    Layout,
+    chart_place,
+)
 from kfsheet.exercise import Exercise
 
 WIDTH, HEIGHT = 17.0, 11.0  # cm
-ROWS_A_CHART, FIRST_CHART_ROW = 24, 4
-COLUMNS = (1, 11)  # in which a chart begins: two charts beside each other
 COLUMN_WIDTH, ROW_HEIGHT = 9.0, 15.0  # said, since programs differ in what they take for granted
 POINT = 12_700  # English metric units
 
@@ -33,16 +38,14 @@ POINT = 12_700  # English metric units
 def draw(book: Workbook, exercise: Exercise, layout: Layout) -> None:
     """Add every chart of the exercise to the sheet "Charts", each under its note."""
     sheet = book["Charts"]
-    for column in range(1, 2 * COLUMNS[1] - 1):
+    for column in range(1, 2 * CHART_COLUMNS[1] - 1):
         sheet.column_dimensions[get_column_letter(column)].width = COLUMN_WIDTH
     sheet.sheet_format.defaultRowHeight, sheet.sheet_format.customHeight = ROW_HEIGHT, True
     sheet.page_setup.fitToHeight = 1
     rows = FIRST_CHART_ROW + ROWS_A_CHART * -(-len(exercise.charts) // 2)
-    sheet.print_area = f"A1:{get_column_letter(2 * COLUMNS[1] - 2)}{rows}"
+    sheet.print_area = f"A1:{get_column_letter(2 * CHART_COLUMNS[1] - 2)}{rows}"
     for n, chart in enumerate(exercise.charts):
-        row = FIRST_CHART_ROW + ROWS_A_CHART * (n // 2)
-        column = COLUMNS[n % 2]
-        sheet.cell(row, column, chart.note)
+        row, column = chart_place(n)
         anchor = f"{get_column_letter(column)}{row + 1}"
         sheet.add_chart(_native(book, exercise, layout, chart), anchor)
 

@@ -21,6 +21,9 @@ from kfsheet.recurrence import Recurrence
 SYMBOL_ROW, UNIT_ROW, WORDS_ROW, FIRST_ROW = 1, 2, 3, 4
 PARAMETER_ROW = 5
 
+FIRST_CHART_ROW, ROWS_A_CHART = 4, 24
+CHART_COLUMNS = (1, 11)  # in which a chart begins: two charts beside each other
+
 Address = tuple[str, int, int]
 """Sheet, row, column; rows and columns count from 1."""
 
@@ -122,6 +125,11 @@ class _Names:
             return get_column_letter(self.layout.columns[self.sheet][name])
         sheet, column = self.layout.home(name)
         return f"{quote(sheet)}!{get_column_letter(column)}"
+
+
+def chart_place(number: int) -> tuple[int, int]:
+    """Row and column of the note above a chart."""
+    return FIRST_CHART_ROW + ROWS_A_CHART * (number // 2), CHART_COLUMNS[number % 2]
 
 
 def quote(sheet: str) -> str:

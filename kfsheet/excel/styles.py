@@ -16,6 +16,7 @@ KINDS = {
     "title": (None, DARK, True, 16),
     "heading": (None, DARK, True, 12),
     "text": (None, "000000", False, 11),
+    "note": (None, "000000", False, 11),
     "header": (DARK, "FFFFFF", True, 11),
     "unit": ("D9E2F3", "404040", False, 10),
     "words": ("D9E2F3", "404040", False, 9),
@@ -30,7 +31,7 @@ LEGEND = {
     "data": "a measurement or another given number; an empty observation was not made",
     "formula": "a formula: it follows from the cells before it",
 }
-BOXED = set(KINDS) - {"title", "heading", "text"}
+BOXED = set(KINDS) - {"title", "heading", "text", "note"}
 
 
 class Styles:
@@ -39,6 +40,7 @@ class Styles:
     def __init__(self, book: Workbook) -> None:
         self.book = book
         self._known: dict[tuple[str, str, str], object] = {}
+        self._numbers: dict[tuple[str, str, str], int] = {}
 
     @cached_property
     def _scratch(self) -> Worksheet:
@@ -52,6 +54,15 @@ class Styles:
         if key not in self._known:
             self._known[key] = self._array(*key)
         return Cell(sheet, row=1, column=1, value=content, style_array=self._known[key])
+
+    def number(self, kind: str, number_format: str, align: str) -> int:
+        """The number by which the file knows a style."""
+        key = (kind, number_format, align)
+        if key not in self._numbers:
+            if key not in self._known:
+                self._known[key] = self._array(*key)
+            self._numbers[key] = self.book._cell_styles.add(self._known[key])
+        return self._numbers[key]
 
     def _array(self, kind: str, number_format: str, align: str) -> object:
         background, colour, bold, size = KINDS[kind]
