@@ -23,3 +23,7 @@ class WorkbookError(KfsheetError):
 
 class EngineError(KfsheetError):
     """A spreadsheet engine is missing, crashed or ran out of time."""
+
+
+class FormulaError(KfsheetError):
+    """A formula cannot be read as mathematics: arrays, look-ups, text, or no formula at all."""
