@@ -1,7 +1,8 @@
 """The value of an expression at one point, to 30 figures, by a spreadsheet's rules.
 
 An expression is worth a number, or :data:`MISSING` where it has no value on purpose (an empty
-text); what a spreadsheet would show as an error raises :class:`NoValue`. mpmath does the numbers.
+text); what a spreadsheet would show as an error raises :class:`NoValueError`. mpmath does the
+numbers.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ DIGITS = 30
 LARGEST = mpf(10) ** 300
 
 
-class NoValue(ArithmeticError):
+class NoValueError(ArithmeticError):
     """A spreadsheet would show an error here."""
 
 
@@ -64,7 +65,7 @@ class _Evaluator:
     def number(self, e: Basic) -> mpf:
         value = self.value(e)
         if value is MISSING:
-            raise NoValue("arithmetic with a text")
+            raise NoValueError("arithmetic with a text")
         return value
 
     def _choice(self, e: Piecewise) -> Value:
@@ -76,13 +77,13 @@ class _Evaluator:
     def _computed(self, e: Basic) -> mpf:
         function = FUNCTIONS.get(type(e).__name__)
         if function is None:
-            raise NoValue(f"{type(e).__name__} has no value")
+            raise NoValueError(f"{type(e).__name__} has no value")
         try:
             result = function(*(self.number(a) for a in e.args))
         except (ArithmeticError, ValueError, TypeError, MemoryError) as error:
-            raise NoValue(str(error)) from None
+            raise NoValueError(str(error)) from None
         if not isinstance(result, mpf) or not abs(result) < LARGEST:
-            raise NoValue("the result is no real number")
+            raise NoValueError("the result is no real number")
         return result
 
     def truth(self, e: Basic) -> bool:
@@ -97,7 +98,7 @@ class _Evaluator:
         if isinstance(e, ITE):
             return self.truth(e.args[1] if self.truth(e.args[0]) else e.args[2])
         if not isinstance(e, Relational):
-            raise NoValue(f"{type(e).__name__} is no condition")
+            raise NoValueError(f"{type(e).__name__} is no condition")
         return RELATIONS[e.rel_op](*(self.number(a) for a in e.args))
 
     def _observed(self, e: Basic) -> bool:
@@ -105,13 +106,13 @@ class _Evaluator:
             if e.is_Symbol or isinstance(e, Indexed):
                 return e == t or self._look_up(e, self._row) not in (None, MISSING)
             return self.value(e) is not MISSING
-        except NoValue:
+        except NoValueError:
             return False
 
 
 def _literal(e: Basic) -> mpf:
     if not e.is_finite:
-        raise NoValue("the result is no real number")
+        raise NoValueError("the result is no real number")
     if e.is_Rational:
         return mpf(e.p) / e.q
     return mpf(e._to_mpmath(mpmath.mp.prec))
@@ -119,9 +120,9 @@ def _literal(e: Basic) -> mpf:
 
 def _power(base: mpf, exponent: mpf) -> mpf:
     if base == 0 and exponent <= 0:
-        raise NoValue("a power of zero")
+        raise NoValueError("a power of zero")
     if base and abs(exponent * mpmath.log(abs(base))) > 1_000:
-        raise NoValue("a power beyond all numbers")
+        raise NoValueError("a power beyond all numbers")
     return mpmath.power(base, exponent)
 
 
@@ -130,7 +131,7 @@ def _bounded(function: Callable[[mpf], mpf]) -> Callable[[mpf], mpf]:
 
     def apply(x: mpf) -> mpf:
         if abs(x) > LIMITS.get(function.__name__, 1_000):
-            raise NoValue("an argument beyond all numbers")
+            raise NoValueError("an argument beyond all numbers")
         return mpf(function(x))
 
     return apply

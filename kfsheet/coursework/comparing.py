@@ -8,8 +8,8 @@ from functools import lru_cache
 import mpmath
 from sympy import Basic
 
-from kfsheet.coursework.arithmetic import DIGITS, MISSING, NoValue, Value, value_of
-from kfsheet.coursework.worlds import DEPTHS, Own, Scene, World
+from kfsheet.coursework.arithmetic import DIGITS, MISSING, NoValueError, Value, value_of
+from kfsheet.coursework.worlds import DEPTHS, NOBODY, Own, Scene, World
 
 TOLERANCE = mpmath.mpf(10) ** -12
 TINY = mpmath.mpf(10) ** -20
@@ -24,7 +24,7 @@ def worth(expression: Basic, world: World) -> Value | str:
     """Value of an expression in a world; ERROR where a spreadsheet would show an error."""
     try:
         return value_of(expression, world, world.row)
-    except (NoValue, RecursionError):
+    except (NoValueError, RecursionError):
         return ERROR
 
 
@@ -50,10 +50,11 @@ class Question:
         self.key = scalar.expression if scalar else scene.model.column(name).definition(row)
         self._wanted: dict[tuple, list[Value | str]] = {}
 
-    def worlds(self, depth: int, own: Own = Own()) -> list[World]:  # noqa: B008
+    def worlds(self, depth: int, own: Own = NOBODY) -> list[World]:
+        """The points at which formulas are compared."""
         return self.scene.worlds(self.name, self.row, depth, own)
 
-    def wanted(self, depth: int, own: Own = Own()) -> list[Value | str]:  # noqa: B008
+    def wanted(self, depth: int, own: Own = NOBODY) -> list[Value | str]:
         """Values of the key."""
         at = (depth, own)
         if at not in self._wanted:
@@ -64,7 +65,7 @@ class Question:
         self,
         expression: Basic,
         depth: int,
-        own: Own = Own(),  # noqa: B008
+        own: Own = NOBODY,
         gaps: bool = True,
     ) -> Iterator[float]:
         """Relative differences at the points that can tell something."""
@@ -78,7 +79,7 @@ class Question:
             if (far := difference(found, wanted)) is not None:
                 yield far
 
-    def same(self, expression: Basic, own: Own = Own(), gaps: bool = True) -> bool:  # noqa: B008
+    def same(self, expression: Basic, own: Own = NOBODY, gaps: bool = True) -> bool:
         """Whether an expression is the key's function, alone or with what the key builds on."""
         if expression == self.key:
             return True

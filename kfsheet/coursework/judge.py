@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 
-from sympy import Basic
+from openpyxl.utils import get_column_letter
+from sympy import Basic, Indexed
 
 from kfsheet.coursework.comparing import Question, question
 from kfsheet.coursework.meaning import Interpreter, parsed
@@ -23,9 +24,10 @@ from kfsheet.coursework.submission import Book, Formula
 from kfsheet.coursework.worlds import Own, Scene
 from kfsheet.errors import FormulaError
 from kfsheet.excel.layout import Address
+from kfsheet.excel.references import Reference
 from kfsheet.exercise import Exercise
 from kfsheet.exercise import Question as Asked
-from kfsheet.expressions import Aggregate, Missing, t
+from kfsheet.expressions import Aggregate, Missing, lag, t
 from kfsheet.recurrence import Recurrence
 
 RIGHT, EMPTY, TYPED, WRONG = "right", "empty", "typed", "wrong"
@@ -37,7 +39,7 @@ DANGEROUS = frozenset(
     "WEBSERVICE HYPERLINK INDIRECT DDE RTD CALL REGISTER.ID FILTERXML IMAGE IMPORTXML IMPORTDATA "
     "IMPORTHTML IMPORTRANGE IMPORTFEED CUBEVALUE EXEC SQL.REQUEST".split()
 )
-SAMPLE = 30  # rows in which a formula with a fixed row is judged
+FARTHEST = 8  # rows back; a key looks one or two rows back
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,7 @@ class Judge:
         self.places = Places.find(book, exercise.model)
         self._interpreter = Interpreter(book, self.places)
         self._exercise = exercise
+        self._verdicts: dict[tuple, tuple[str, str]] = {}
 
     def marks(self) -> list[Mark]:
         """One mark for each question."""
@@ -117,17 +120,30 @@ class Judge:
             meaning = self._interpreter.meaning(address, step)
         except FormulaError as error:
             return Cell(step, address, UNREADABLE, words=str(error))
-        if meaning.expression.has(Aggregate):
-            return Cell(step, address, UNREADABLE, words="it takes a whole column")
-        return self._judged(name, Cell(step, address, WRONG, *meaning))
+        lagged = as_lags(meaning.expression, step) if meaning.fixed_rows else meaning.expression
+        key = (name, lagged, self._rule(name, step))
+        if key not in self._verdicts:
+            self._verdicts[key] = self._judged(name, Cell(step, address, WRONG, lagged))
+        status, words = self._verdicts[key]
+        expression = None if status in (UNREADABLE, TYPED) else meaning.expression
+        return Cell(step, address, status, expression, meaning.fixed_rows, words)
 
-    def _judged(self, name: str, cell: Cell) -> Cell:
+    def _rule(self, name: str, step: int) -> int:
+        """Number of the rule that holds in a step: a start value, or the general one."""
+        if name in self._model.derived_scalars:
+            return 0
+        return min(step, len(self._model.column(name).start))
+
+    def _judged(self, name: str, cell: Cell) -> tuple[str, str]:
+        if cell.expression.has(Aggregate):
+            return UNREADABLE, "it takes a whole column"
         if not cell.expression.free_symbols and self._reads_nothing(cell):
-            return Cell(cell.step, cell.address, TYPED)
-        steps = _judged_in(self._model, name, cell)
+            return TYPED, ""
+        if farthest(cell.expression) > FARTHEST:
+            return WRONG, ""
+        steps = _judged_in(self._model, name, cell.step)
         right = all(is_right(self._scene, name, step, cell.expression) for step in steps)
-        status = RIGHT if right else WRONG
-        return Cell(cell.step, cell.address, status, cell.expression, cell.fixed)
+        return RIGHT if right else WRONG, ""
 
     def _reads_nothing(self, cell: Cell) -> bool:
         content = self._book.sheets[cell.address[0]][cell.address[1:]]
@@ -157,7 +173,9 @@ class Judge:
         )
         if expression is None:
             return culprit, words or PLAIN_WORDS[status], ""
-        step = _judged_in(self._model, name, culprit)[0]
+        if culprit.fixed:
+            expression = as_lags(expression, culprit.step)
+        step = _judged_in(self._model, name, culprit.step)[0]
         status, words, fingerprint = diagnose(self._scene, name, step, expression, self._own)
         if status == WRONG and culprit.fixed and len(rest) > 1:
             words = f"every row refers to {self._fixed_words(culprit)}; {words}"
@@ -218,17 +236,25 @@ def _decided(cell: Cell, found: dict[int, bool]) -> Cell:
     )
 
 
-def _judged_in(model: Recurrence, name: str, cell: Cell) -> list[int]:
+def as_lags(expression: Basic, step: int) -> Basic:
+    """The same cells as rows above ``step``: ``x[3]`` is ``x[t - 1]`` in step 4."""
+    cells = {c for c in expression.atoms(Indexed) if c.indices[0].is_Integer}
+    return expression.xreplace({c: c.base[t - (step - int(c.indices[0]))] for c in cells})
+
+
+def farthest(expression: Basic) -> int:
+    """How many rows away the farthest cell is that an expression reads."""
+    return max((abs(int(lag(c))) for c in expression.atoms(Indexed)), default=0)
+
+
+def _judged_in(model: Recurrence, name: str, step: int) -> list[int]:
     """Steps in which a formula is judged for all rows that hold it."""
     if name in model.derived_scalars:
         return [0]
     starts = len(model.column(name).start)
-    if cell.step < starts:
-        return [cell.step]
-    if not cell.fixed:
-        return sorted({starts, (starts + model.rows - 1) // 2, model.rows - 1})
-    stride = max(1, (model.rows - starts) // SAMPLE)
-    return [starts + (cell.step - starts) // stride * stride]
+    if step < starts:
+        return [step]
+    return sorted({starts, (starts + model.rows - 1) // 2, model.rows - 1})
 
 
 @lru_cache(maxsize=200_000)
@@ -310,10 +336,8 @@ def _rows(cells: list[Cell]) -> str:
     return f"row{'s' * (len(numbers) > 1)} {', '.join(shown[:5])}{more}"
 
 
-def _show(reference, host: tuple[int, int]) -> str:
+def _show(reference: Reference, host: tuple[int, int]) -> str:
     """A reference as the student typed it."""
-    from openpyxl.utils import get_column_letter
-
     if reference.name:
         return reference.name
     shown = []

@@ -21,7 +21,7 @@ from mpmath import mpf
 from sympy import Basic, Indexed
 
 from kfsheet.checks import columns_read, scalars
-from kfsheet.coursework.arithmetic import MISSING, NoValue, Value, value_of
+from kfsheet.coursework.arithmetic import MISSING, NoValueError, Value, value_of
 from kfsheet.excel.compose import Run
 from kfsheet.expressions import lag
 from kfsheet.parts import Column, Parameter
@@ -42,6 +42,9 @@ class Own:
     data: tuple[tuple[str, tuple[float, ...]], ...] = ()
 
 
+NOBODY = Own()
+
+
 class World:
     """One random point for the formulas of one question in one row."""
 
@@ -53,7 +56,7 @@ class World:
         self._own = dict(own.parameters)
         self._own_data = dict(own.data)
         self._seed = f"{scene.model.name}/{number}"
-        self._known: dict[tuple[str, int], Value | NoValue] = {}
+        self._known: dict[tuple[str, int], Value | NoValueError] = {}
 
     def __call__(self, node: Basic, row: int) -> Value:
         """Value of a symbol, or of a cell of a column, for a formula in ``row``."""
@@ -65,13 +68,13 @@ class World:
     def _value(self, name: str, row: int) -> Value:
         key = (name, row)
         if key not in self._known:
-            self._known[key] = NoValue("it goes in a circle")
+            self._known[key] = NoValueError("it goes in a circle")
             try:
                 self._known[key] = self._computed(name, row)
-            except NoValue as error:
+            except NoValueError as error:
                 self._known[key] = error
         found = self._known[key]
-        if isinstance(found, NoValue):
+        if isinstance(found, NoValueError):
             raise found
         return found
 
@@ -164,7 +167,7 @@ class Scene:
             self._ranges[name] = (largest, sorted(values) if few and len(values) > 1 else [])
         return self._ranges[name]
 
-    def worlds(self, name: str, row: int, depth: int, own: Own = Own()) -> list[World]:
+    def worlds(self, name: str, row: int, depth: int, own: Own = NOBODY) -> list[World]:
         """Worlds for the formulas of one question in one row; those without gaps come first."""
         key = (name, row, depth, own)
         if key not in self._worlds:

@@ -129,7 +129,9 @@ def relative_key(text: str, host: Cell) -> str:
     def shift(match: re.Match) -> str:
         if match[2] is None:
             return match[0]
-        corner = _corner(*match.groups()).seen_from(host)
-        return f"{{{corner.row}{match[3]},{corner.column}{match[1]}}}"
+        column_fixed, letters, row_fixed, row = match.groups()
+        down = int(row) - (0 if row_fixed else host[0])
+        right = column_index_from_string(letters.upper()) - (0 if column_fixed else host[1])
+        return f"{{{down}{row_fixed},{right}{column_fixed}}}"
 
     return PIECES.sub(shift, text)
