@@ -85,7 +85,7 @@ class Judge:
         self, exercise: Exercise, scene: Scene, book: Book, own: Own, recalculated: Recalculated
     ) -> None:
         self._model, self._scene, self._own = exercise.model, scene, own
-        self._book, self._recalculated = book, recalculated
+        self.book, self._recalculated = book, recalculated
         self.places = Places.find(book, exercise.model)
         self._interpreter = Interpreter(book, self.places)
         self._exercise = exercise
@@ -109,7 +109,7 @@ class Judge:
         address = self.places.address(name, step)
         if address is None:
             return None
-        content = self._book.sheets[address[0]].get(address[1:])
+        content = self.book.sheets[address[0]].get(address[1:])
         if content is None or content == "":
             return Cell(step, address, EMPTY)
         if not isinstance(content, Formula):
@@ -146,7 +146,7 @@ class Judge:
         return RIGHT if right else WRONG, ""
 
     def _reads_nothing(self, cell: Cell) -> bool:
-        content = self._book.sheets[cell.address[0]][cell.address[1:]]
+        content = self.book.sheets[cell.address[0]][cell.address[1:]]
         return not parsed(content)[1]
 
     # -- from cells to a mark --------------------------------------------------------------
@@ -183,10 +183,10 @@ class Judge:
 
     def _where(self, rest: list[Cell], right: list[Cell]) -> str:
         first = rest[0]
-        content = self._book.sheets[first.address[0]].get(first.address[1:])
+        content = self.book.sheets[first.address[0]].get(first.address[1:])
         if not isinstance(content, Formula):
             return f"not in {_rows(rest)}"
-        usual = self._book.sheets[right[-1].address[0]][right[-1].address[1:]]
+        usual = self.book.sheets[right[-1].address[0]][right[-1].address[1:]]
         known = set(parsed(usual)[1])
         try:
             strange = [r for r in parsed(content)[1] if r not in known]
@@ -198,7 +198,7 @@ class Judge:
         )
 
     def _fixed_words(self, cell: Cell) -> str:
-        content = self._book.sheets[cell.address[0]][cell.address[1:]]
+        content = self.book.sheets[cell.address[0]][cell.address[1:]]
         fixed = (r for r in parsed(content)[1] if r.first and r.first.row_fixed)
         shown = (
             _show(r, cell.address[1:])

@@ -49,7 +49,13 @@ class World:
     """One random point for the formulas of one question in one row."""
 
     def __init__(
-        self, scene: Scene, row: int, depth: int, number: int, blocked: frozenset[str], own: Own
+        self,
+        scene: Scene,
+        row: int,
+        depth: int,
+        number: int,
+        blocked: frozenset[str] = frozenset(),
+        own: Own = Own(),
     ) -> None:
         self._scene, self.row, self.depth, self._blocked = scene, row, depth, blocked
         self.wild, self.gaps = number % 2 == 1, number >= 6
@@ -62,8 +68,12 @@ class World:
         """Value of a symbol, or of a cell of a column, for a formula in ``row``."""
         if node.is_Symbol:
             return self._value(node.name, 0)
-        name, fixed, place = _cell(node)
+        name, fixed, place = cell_of(node)
         return self._value(name, place if fixed else row - place)
+
+    def cell(self, name: str, row: int) -> Value:
+        """Value of a column in a row."""
+        return self._value(name, row)
 
     def _value(self, name: str, row: int) -> Value:
         key = (name, row)
@@ -138,7 +148,7 @@ class World:
 
 
 @lru_cache(maxsize=10_000)
-def _cell(node: Indexed) -> tuple[str, bool, int]:
+def cell_of(node: Indexed) -> tuple[str, bool, int]:
     """Column of a cell reference, whether its row is fixed, and the row or the lag."""
     index = node.indices[0]
     fixed = bool(index.is_Integer)
@@ -162,7 +172,7 @@ class Scene:
         """Largest size in the run; and the values, where there are only a few whole ones."""
         if name not in self._ranges:
             values = {v for v in base if not isnan(v)}
-            few = len(base) > 4 and len(values) <= 4 and all(v.is_integer() for v in values)
+            few = len(base) > 4 and len(values) <= 4 and all(float(v).is_integer() for v in values)
             largest = max(map(abs, values), default=0) or 1.0
             self._ranges[name] = (largest, sorted(values) if few and len(values) > 1 else [])
         return self._ranges[name]
