@@ -48,15 +48,10 @@ class Assessment:
 
 
 @lru_cache(maxsize=4)
-def scene_of(exercise: Exercise) -> Scene:
-    """The random points of an exercise, made once."""
-    return Scene(exercise.model)
-
-
-@lru_cache(maxsize=4)
-def exercise_of(spec: str) -> Exercise:
-    """An exercise, loaded once."""
-    return load_exercise(spec)
+def prepared(spec: str) -> tuple[Exercise, Scene]:
+    """An exercise and its random points, made once in a process."""
+    exercise = load_exercise(spec)
+    return exercise, Scene(exercise.model)
 
 
 def assess(spec: str, secret: bytes, path: Path, copy: Path | None = None) -> Assessment:
@@ -73,11 +68,11 @@ def assess(spec: str, secret: bytes, path: Path, copy: Path | None = None) -> As
     copy : Path, optional
         Where the marked copy of the workbook goes.
     """
-    exercise = exercise_of(spec)
+    exercise, scene = prepared(spec)
     try:
         book = read_submission(path)
         student = _student(book, exercise, secret)
-        return _assessed(exercise, secret, path, book, student, copy)
+        return _assessed(exercise, scene, secret, path, book, student, copy)
     except SubmissionError as error:
         return Assessment(error.status, error.remark)
     except MemoryError:
@@ -103,9 +98,15 @@ def _student(book: Book, exercise: Exercise, secret: bytes) -> str:
 
 
 def _assessed(
-    exercise: Exercise, secret: bytes, path: Path, book: Book, student: str, copy: Path | None
+    exercise: Exercise,
+    scene: Scene,
+    secret: bytes,
+    path: Path,
+    book: Book,
+    student: str,
+    copy: Path | None,
 ) -> Assessment:
-    own, scene = own_numbers(exercise, secret, student), scene_of(exercise)
+    own = own_numbers(exercise, secret, student)
 
     def asked(name: str) -> dict[int, bool]:
         return recalculated(path, scene, judge.places, name)
