@@ -98,7 +98,7 @@ class Question:
         """Whether it differs by no more than a rounded constant would."""
         for depth in DEPTHS:
             far = sorted(self.differences(expression, depth, gaps=False))
-            if len(far) >= ENOUGH and far[-1] < ROUGH:
+            if len(far) >= ENOUGH and far[3 * len(far) // 4] < ROUGH:
                 return True
         return False
 

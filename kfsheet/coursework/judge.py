@@ -175,7 +175,8 @@ class Judge:
             return culprit, words or PLAIN_WORDS[status], ""
         if culprit.fixed:
             expression = as_lags(expression, culprit.step)
-        step = _judged_in(self._model, name, culprit.step)[0]
+        steps = _judged_in(self._model, name, culprit.step)
+        step = next((k for k in steps if not is_right(self._scene, name, k, expression)), steps[0])
         status, words, fingerprint = diagnose(self._scene, name, step, expression, self._own)
         if status == WRONG and culprit.fixed and len(rest) > 1:
             words = f"every row refers to {self._fixed_words(culprit)}; {words}"
@@ -276,11 +277,11 @@ def diagnose(
         names = ", ".join(_still(asked, expression, own)) or "a parameter"
         words = f"right only as long as {names} keeps its value: a number stands in its place"
         return HARD_CODED, words, fingerprint
-    if asked.same(expression, own):
-        return HARD_CODED, "a number from the data stands where its cell belongs", fingerprint
     if asked.same(expression, gaps=False):
         words = "right where there is an observation, wrong where one is missing"
         return GAPS, words, fingerprint
+    if asked.same(expression, own):
+        return HARD_CODED, "a number from the data stands where its cell belongs", fingerprint
     if asked.nearly(expression):
         return ROUNDED, "nearly right: a constant in it is rounded", fingerprint
     return WRONG, _words_of(scene, name, step, expression, values), fingerprint

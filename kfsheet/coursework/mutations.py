@@ -61,7 +61,8 @@ def _of_node(model: Recurrence, e: Basic) -> Iterator[tuple[str, Expr]]:
     elif isinstance(e, Mul):
         for n, factor in enumerate(e.args):
             rest = [*e.args[:n], *e.args[n + 1 :]]
-            yield (SIGN if factor == -1 else FACTOR), Mul(*rest)
+            words = SIGN if factor == -1 else NO_SIGN if isinstance(factor, sign) else FACTOR
+            yield words, Mul(*rest)
             if factor != -1:
                 yield INVERSE, Mul(*rest, 1 / factor)
     elif isinstance(e, Pow):

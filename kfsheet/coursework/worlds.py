@@ -31,6 +31,7 @@ from kfsheet.schedule import same_row
 ALONE = -1
 """Depth of the worlds in which every column is drawn by itself."""
 DEPTHS = (ALONE, 0, 1, 2)
+WITHOUT_GAPS, WITH_GAPS = 8, 6  # worlds; every other one is wild
 SPREAD = 0.3  # of a value about the one in the model's own run
 
 
@@ -58,7 +59,9 @@ class World:
         own: Own = Own(),
     ) -> None:
         self._scene, self.row, self.depth, self._blocked = scene, row, depth, blocked
-        self.wild, self.gaps = number % 2 == 1, number >= 6
+        self.wild, self.gaps = number % 2 == 1, number >= WITHOUT_GAPS
+        self._empty = number in (WITHOUT_GAPS, WITHOUT_GAPS + 1)
+        self._number = number
         self._own = dict(own.parameters)
         self._own_data = dict(own.data)
         self._seed = f"{scene.model.name}/{number}"
@@ -126,7 +129,14 @@ class World:
         return random.Random(f"{self._seed}/{name}/{row}")
 
     def _gap(self, name: str, row: int) -> bool:
-        return self.gaps and self._random(f"gap {name}", row).random() < 0.5
+        """Nothing is observed in the first of the worlds with gaps, half of it in the others."""
+        return self.gaps and (self._empty or self._random(f"gap {name}", row).random() < 0.5)
+
+    def _sign(self, name: str, row: int) -> int:
+        """Either sign in two of four neighbouring worlds of a kind, in an order of its own."""
+        signs = [1, 1, -1, -1]
+        random.Random(f"{self._scene.model.name}/{name}/{row}").shuffle(signs)
+        return signs[self._number // 2 % 4]
 
     def _parameter(self, parameter: Parameter) -> Value:
         if parameter.name in self._own:
@@ -143,7 +153,7 @@ class World:
             return mpf(dice.choice(few))
         own = base[row] if row < len(base) else 0.0
         if self.wild or isnan(own) or own == 0:
-            return mpf(dice.uniform(-largest, largest))
+            return mpf(dice.uniform(0, largest)) * self._sign(name, row)
         return mpf(own * exp(dice.gauss(0, SPREAD)))
 
 
@@ -184,7 +194,7 @@ class Scene:
             if len(self._worlds) > 2_000:
                 self._worlds.clear()
             gaps = any(c.may_be_missing for c in self.model.all_columns())
-            count = 10 if gaps else 6
+            count = WITHOUT_GAPS + WITH_GAPS * gaps
             blocked = self.consequences(name)
             self._worlds[key] = [World(self, row, depth, n, blocked, own) for n in range(count)]
         return self._worlds[key]
