@@ -45,7 +45,8 @@ def recalculated(path: Path, scene: Scene, places: Places, name: str) -> dict[in
             wanted = worth(question(scene, name, step).key, live)
             found = live.found(step)
             far = difference(found, wanted)
-            if (world.wild and found is ERROR) or far is None:
+            senseless = isinstance(wanted, mpmath.mpf) and abs(wanted) > HUGE
+            if far is None or (world.wild and (ERROR in (found, wanted) or senseless)):
                 continue
             good[step] &= far <= TOLERANCE
             counts[step] += isinstance(wanted, mpmath.mpf)

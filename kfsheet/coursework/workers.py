@@ -18,11 +18,15 @@ MEMORY = 3 * 2**30  # bytes of address space
 SECONDS = 120.0
 
 
+READY = "ready"
+
+
 @dataclass
 class _Worker:
     process: multiprocessing.process.BaseProcess
     pipe: Connection
     task: Any = None
+    ready: bool = False
     deadline: float = float("inf")
 
 
@@ -35,6 +39,7 @@ class Failed:
 
 def _serve(pipe: Connection, function: Callable[..., Any], memory: int) -> None:
     _limit(memory)
+    pipe.send(READY)
     while (arguments := pipe.recv()) is not None:
         try:
             pipe.send(function(*arguments))
@@ -89,16 +94,23 @@ class Pool:
         return _Worker(process, ours)
 
     def _give(self, worker: _Worker, task: tuple) -> None:
-        worker.task, worker.deadline = task, time.monotonic() + self._seconds
+        worker.task = task
+        if worker.ready:
+            worker.deadline = time.monotonic() + self._seconds
         worker.pipe.send(task)
 
     def _collect(self) -> Iterator[tuple[tuple, Any]]:
         busy = [w for w in self._workers if w.task is not None]
         left = min(w.deadline for w in busy) - time.monotonic()
-        ready = wait([w.pipe for w in busy], timeout=max(0.0, left))
+        timeout = max(0.0, min(left, self._seconds))
+        ready = wait([w.pipe for w in busy], timeout=timeout)
         for worker in busy:
             if worker.pipe in ready:
-                yield worker.task, self._received(worker)
+                task, found = worker.task, self._received(worker)
+                if found == READY:  # its time begins now, not while it starts
+                    worker.ready, worker.deadline = True, time.monotonic() + self._seconds
+                else:
+                    yield task, found
             elif time.monotonic() >= worker.deadline:
                 task = worker.task
                 self._replace(worker)
@@ -110,7 +122,8 @@ class Pool:
         except (EOFError, OSError):
             self._replace(worker)
             return Failed("crashed")
-        worker.task = None
+        if result != READY:
+            worker.task = None
         return result
 
     def _replace(self, worker: _Worker) -> None:
