@@ -1,4 +1,4 @@
-"""The command line: ``kfsheet build | check | show``."""
+"""The command line: ``kfsheet build | check | show | handout | grade``."""
 
 from __future__ import annotations
 
@@ -77,7 +77,38 @@ def parser() -> Parser:
         help="Python source, LaTeX, Excel formulas, or a table of numbers (default)",
     )
     show.set_defaults(run=run_show)
+    _add_coursework(commands, exercise)
     return top
+
+
+def _add_coursework(commands: argparse._SubParsersAction, exercise: str) -> None:
+    handout = commands.add_parser("handout", help="make every student's own assignment")
+    grade = commands.add_parser("grade", help="grade what comes back")
+    for command in (handout, grade):
+        command.add_argument("exercise", metavar="EXERCISE", help=exercise)
+    grade.add_argument("submissions", metavar="SUBMISSIONS", help="folder of what came back")
+    for command in (handout, grade):
+        command.add_argument(
+            "--roster", required=True, metavar="FILE.csv", help="students: id,name[,email]"
+        )
+        command.add_argument(
+            "--secret",
+            metavar="FILE",
+            help="the secret of the course (default: kfsheet.secret beside the roster)",
+        )
+        command.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
+    handout.add_argument(
+        "--notebook", action="store_true", help="also write an assignment for nbgrader"
+    )
+    handout.set_defaults(run=run_handout)
+    grade.add_argument("--jobs", type=_count, default=1, metavar="N", help="processes (default: 1)")
+    grade.set_defaults(run=run_grade)
+
+
+def _count(text: str) -> int:
+    if not text.isdigit() or not 1 <= int(text) <= 256:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number from 1 to 256")
+    return int(text)
 
 
 def run_build(arguments: argparse.Namespace) -> int:
@@ -155,6 +186,61 @@ def run_show(arguments: argparse.Namespace) -> int:
     from kfsheet.show import DRESSES
 
     print(DRESSES[arguments.dress](load_exercise(arguments.exercise).model))
+    return HOLDS
+
+
+def _secret(arguments: argparse.Namespace, *, make: bool) -> bytes:
+    from kfsheet.coursework.tokens import read_secret
+
+    default = Path(arguments.roster).parent / "kfsheet.secret"
+    return read_secret(arguments.secret or default, make=make)
+
+
+def run_handout(arguments: argparse.Namespace) -> int:
+    """Write a workbook for every student, and its solution."""
+    from kfsheet.coursework.handout import write_handouts
+    from kfsheet.coursework.roster import read_roster
+    from kfsheet.exercises import load_exercise
+
+    exercise = load_exercise(arguments.exercise)
+    students = read_roster(arguments.roster)
+    secret = _secret(arguments, make=True)
+    made = write_handouts(exercise, students, secret, arguments.out)
+    count = sum(1 for _ in progress(made, "handout", [s.id for s in students]))
+    print(f"{count} workbooks in {Path(arguments.out) / 'students'}")
+    print(f"their solutions in {Path(arguments.out) / 'solutions'}; do not hand these out")
+    if arguments.notebook:
+        from kfsheet.coursework.notebook import write_assignment
+
+        print(write_assignment(exercise, arguments.out))
+    return HOLDS
+
+
+def run_grade(arguments: argparse.Namespace) -> int:
+    """Grade a folder of submissions; a bad file is a status in the table, not an error."""
+    from kfsheet.coursework.grading import grade, override
+    from kfsheet.coursework.overrides import read_overrides, with_all_marks
+    from kfsheet.coursework.reports import write_reports
+    from kfsheet.coursework.roster import read_roster
+    from kfsheet.exercises import load_exercise
+
+    exercise = load_exercise(arguments.exercise)
+    students = read_roster(arguments.roster)
+    out = Path(arguments.out)
+    lines = read_overrides(out / "overrides.csv", exercise, {s.id for s in students})
+    results, handed = grade(
+        exercise,
+        arguments.exercise,
+        arguments.submissions,
+        students,
+        _secret(arguments, make=False),
+        out,
+        jobs=arguments.jobs,
+        progress=lambda items, count: progress(items, "grade", list(map(str, range(1, count + 1)))),
+    )
+    results = override([with_all_marks(r, exercise) for r in results], iter(lines))
+    for path in write_reports(exercise, results, handed, out):
+        print(path)
     return HOLDS
 
 

@@ -23,3 +23,15 @@ class WorkbookError(KfsheetError):
 
 class EngineError(KfsheetError):
     """A spreadsheet engine is missing, crashed or ran out of time."""
+
+
+class FormulaError(KfsheetError):
+    """A formula cannot be read as mathematics: arrays, look-ups, text, or no formula at all."""
+
+
+class SubmissionError(KfsheetError):
+    """A file that was handed in cannot be graded; ``status`` is one word for a table."""
+
+    def __init__(self, status: str, remark: str) -> None:
+        super().__init__(f"{status}: {remark}")
+        self.status, self.remark = status, remark

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from kfsheet.charts import Chart
 from kfsheet.errors import ModelError
 from kfsheet.recurrence import Recurrence
+
+if TYPE_CHECKING:
+    from numpy.random import RandomState
+
+Draw = Callable[["RandomState", Mapping[str, float]], Mapping[str, list[float]]]
+"""Draws data columns by name, from a generator and the values of all parameters."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +48,12 @@ class Exercise:
         What each worksheet holds, by its name.
     greyed : str
         A column that is 0 in rows that no longer count; they are shown in grey.
+    vary : dict
+        Parameters that differ from student to student: lowest and highest value by name.
+    noise : tuple of str
+        Data columns that hold standard-normal draws; every student gets other ones.
+    draw : function of (generator, parameters), optional
+        Draws other data columns anew, as lists by name; None in a list is a missing value.
 
     Raises
     ------
@@ -55,6 +69,9 @@ class Exercise:
     notebook: str = ""
     sections: dict[str, str] = field(default_factory=dict)
     greyed: str = ""
+    vary: dict[str, tuple[float, float]] = field(default_factory=dict)
+    noise: tuple[str, ...] = ()
+    draw: Draw | None = None
 
     def __post_init__(self) -> None:
         for name, kind in (("about", str), ("charts", Chart), ("questions", Question)):
@@ -73,6 +90,18 @@ class Exercise:
             self.model.column(self.greyed)
         if unknown := set(self.sections) - set(self.model.sections):
             raise ModelError(f"{self.name} has no section {unknown.pop()!r}")
+        self._check_variation()
+
+    def _check_variation(self) -> None:
+        for name, limits in self.vary.items():
+            if name not in self.model.parameters:
+                raise ModelError(f"{self.name}: vary names {name}, which is no parameter")
+            low, high = (self.model.parameters[name].checked(limit) for limit in limits)
+            if not low < high:
+                raise ModelError(f"{self.name}: vary {name} needs a lower and a higher value")
+        for name in self.noise:
+            if not self.model.column(name).is_data:
+                raise ModelError(f"{self.name}: noise names {name}, which is no data column")
 
     def _check_question(self, question: Question) -> None:
         if not isinstance(question.points, int) or question.points <= 0:

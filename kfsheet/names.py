@@ -18,7 +18,7 @@ RESERVED = frozenset(
     "last sumproduct isnan fsum range len zip dict columns scalars model data "
     "members executor".split()
 )
-OWN_SHEETS = ("Read me", "Parameters", "Charts", "Check", "History")
+OWN_SHEETS = ("Read me", "Parameters", "Charts", "Check", "History", "Questions", "kfsheet")
 FORBIDDEN_IN_SHEETS = set("[]:*?/\\'{}!")
 
 

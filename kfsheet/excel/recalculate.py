@@ -39,6 +39,7 @@ VALUE = re.compile(rb"<((?:\w+:)?v)\b[^>]*?(?:/>|>.*?</\1>)", re.DOTALL)
 TYPE = re.compile(rb'\s+t="[^"]*"')
 # openpyxl types an empty cell as a number, and IronCalc then reads a 0: a photo that is not there.
 EMPTY = re.compile(rb'(<(?:\w+:)?c\s[^>]*?)\s+t="n"(\s*/>|></(?:\w+:)?c>)')
+HOLLOW = re.compile(rb"<((?:\w+:)?c)(\s[^>]*?)\s*/>")
 ADDRESS = re.compile(rb'\sr="([A-Z]+\d+)"')
 MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
 LINKS = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
@@ -170,7 +171,17 @@ def _strip(xml: bytes, numbers: dict[tuple[int, int], float | None]) -> bytes:
         emptied = VALUE.sub(rb"<\1></\1>", inside)
         return b"<%s%s>%s</%s>" % (tag, TYPE.sub(b"", attributes), emptied, tag)
 
-    return EMPTY.sub(rb"\1\2", CELL.sub(cell, xml))
+    def filled(match: re.Match[bytes]) -> bytes:
+        tag, attributes = match.groups()
+        address = ADDRESS.search(attributes)
+        value = new.get(address[1]) if address else None
+        if value is None:
+            return match[0]
+        content = b"<v>%s</v>" % repr(value).encode()
+        return b"<%s%s>%s</%s>" % (tag, TYPE.sub(b"", attributes), content, tag)
+
+    xml = EMPTY.sub(rb"\1\2", CELL.sub(cell, xml))
+    return HOLLOW.sub(filled, xml) if new else xml
 
 
 def _ironcalc(copy: Path) -> Values:

@@ -7,7 +7,7 @@ from math import floor, isfinite, log10, sqrt
 
 from openpyxl import Workbook
 from openpyxl.cell import Cell
-from openpyxl.styles import Alignment, Border, Font, PatternFill, Side
+from openpyxl.styles import Alignment, Border, Font, PatternFill, Protection, Side
 from openpyxl.worksheet.worksheet import Worksheet
 
 DARK, LINE = "1F3864", "BFBFBF"
@@ -81,6 +81,8 @@ class Styles:
             wrap_text=wrap,
             indent=indent,
         )
+        if kind == "answer":
+            model.protection = Protection(locked=False)
         if number_format:
             model.number_format = number_format
         return model._style

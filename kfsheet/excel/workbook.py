@@ -51,7 +51,20 @@ def workbook_bytes(exercise: Exercise) -> bytes:
     """The workbook of an exercise; the same bytes for the same exercise."""
     layout = Layout.standard(exercise.model)
     now = Run.of(exercise.model)
+    return built_bytes(exercise, layout, now)
+
+
+def built_bytes(exercise: Exercise, layout: Layout, now: Run) -> bytes:
+    """The workbook of an exercise for a run with other parameters and data."""
     pages = compose(exercise, layout, now, now)
+    book = assemble(exercise, layout, pages, now)
+    saved = BytesIO()
+    book.save(saved)
+    return finish(saved.getvalue(), _stored_values(pages))
+
+
+def assemble(exercise: Exercise, layout: Layout, pages: list[Page], now: Run) -> Workbook:
+    """Pages as a workbook of openpyxl, with names, validations and charts."""
     book = Workbook()
     book.remove(book.active)
     styles = Styles(book)
@@ -59,15 +72,14 @@ def workbook_bytes(exercise: Exercise) -> bytes:
         _write_page(book, styles, page)
     styles.close()
     _define_names(book, layout, pages)
-    _add_validations(book["Parameters"], layout)
-    _colour_verdict(book["Check"])
+    _add_validations(book["Parameters"], layout, now)
+    if "Check" in book.sheetnames:
+        _colour_verdict(book["Check"])
     if exercise.greyed:
         _grey_rows(book, layout, exercise.greyed)
     draw(book, exercise, layout)
     _describe(book, exercise)
-    saved = BytesIO()
-    book.save(saved)
-    return finish(saved.getvalue(), _stored_values(pages))
+    return book
 
 
 def write_workbook(exercise: Exercise, path: str | Path, *, force: bool = False) -> Path:
@@ -138,7 +150,7 @@ def _define_names(book: Workbook, layout: Layout, pages: list[Page]) -> None:
         book.defined_names[name] = DefinedName(name, attr_text=cell)
 
 
-def _add_validations(sheet: Worksheet, layout: Layout) -> None:
+def _add_validations(sheet: Worksheet, layout: Layout, now: Run) -> None:
     """Input messages, and refusal of values that a parameter cannot have."""
     limits = {"positive": "greaterThan", "nonnegative": "greaterThanOrEqual"}
     for name, parameter in layout.model.parameters.items():
@@ -153,7 +165,7 @@ def _add_validations(sheet: Worksheet, layout: Layout) -> None:
             errorTitle=name,
             error=f"{name} must be a number" + (f", {parameter.bound}" if bound else ""),
             promptTitle=name,
-            prompt=f"{parameter.description}. At build: {parameter.value:g} {parameter.unit}",
+            prompt=f"{parameter.description}. At build: {now.scalars[name]:g} {parameter.unit}",
         )
         rule.add(f"{get_column_letter(layout.scalars[name][2])}{layout.scalars[name][1]}")
         sheet.add_data_validation(rule)

@@ -308,4 +308,12 @@ exercise = Exercise(
     notebook="notebooks/02_cannonball.ipynb",
     sections=SECTIONS,
     greyed="in_flight",
+    vary={
+        "v_0": (850, 910),
+        "angle": (40, 45),
+        "x_R": (27_000, 33_000),
+        "sigma_theta": (0.006, 0.015),
+        "sigma_r": (20, 40),
+    },
+    noise=("n_theta", "n_r"),
 )

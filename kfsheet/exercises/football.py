@@ -7,7 +7,10 @@ behind two switches: ``h`` = 1/2 and ``p`` = 1 are the printed model, ``h`` = 0 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from math import hypot
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sympy import Abs, Expr, IndexedBase, Piecewise, diag, sign, sqrt
 
@@ -18,6 +21,9 @@ from kfsheet.exercise import Exercise, Question
 from kfsheet.expressions import RMS, Last, Mean, Missing, Std, t, when_observed
 from kfsheet.recurrence import Recurrence
 from kfsheet.tables import Table, read_table
+
+if TYPE_CHECKING:
+    from numpy.random import RandomState
 
 DATA = Path(__file__).parent / "data"
 STEP = 0.1  # s, between two photos
@@ -247,6 +253,34 @@ def _check_times(camera: object, photos: Table, truth: object, flight: Table) ->
 
 football = build_model()
 
+
+def draw_kick(dice: RandomState, p: Mapping[str, float]) -> dict[str, list[float | None]]:
+    """Another kick, simulated like the first one; one pixel of each kind is not observed."""
+    x, z = _flight(p)
+    n_i, n_j = dice.normal(size=(2, football.rows))
+    i = [p["a"] * v + p["r_i"] ** 0.5 * n for v, n in zip(x, n_i, strict=True)]
+    j = [p["j_0"] - p["a"] * v + p["r_j"] ** 0.5 * n for v, n in zip(z, n_j, strict=True)]
+    seen = {"i": [round(v, 1) for v in i], "j": [round(v, 1) for v in j]}
+    for pixels in seen.values():
+        pixels[dice.randint(3, football.rows - 3)] = None
+    return {**seen, "x_true": [round(v, 6) for v in x], "z_true": [round(v, 6) for v in z]}
+
+
+def _flight(p: Mapping[str, float], parts: int = 100) -> tuple[list[float], list[float]]:
+    """Quadratic drag f along the path, in fine steps, from the start values."""
+    x, z, u, w = p["x_0"], p["z_0"], p["u_0"], p["w_0"]
+    h = p["dt"] / parts
+    path = [(x, z)]
+    for _ in range(football.rows - 1):
+        for _ in range(parts):
+            speed = hypot(u, w)
+            du, dw = -p["f"] * speed * u * h, -(p["f"] * speed * w + p["g"]) * h
+            x, z = x + (u + du / 2) * h, z + (w + dw / 2) * h
+            u, w = u + du, w + dw
+        path.append((x, z))
+    return [p[0] for p in path], [p[1] for p in path]
+
+
 ABOUT = (
     "A football is kicked from 23.4 m towards the goal line at x = 0 and photographed ten times a "
     "second. Each photo gives two pixels, with an error of 3 pixels; a simple model of the flight "
@@ -354,4 +388,14 @@ exercise = Exercise(
     questions=QUESTIONS,
     notebook="notebooks/01_football.ipynb",
     sections=SECTIONS,
+    vary={
+        "x_0": (22.5, 25),
+        "u_0": (-23, -20),
+        "w_0": (9.5, 11.5),
+        "a": (40, 50),
+        "j_0": (480, 520),
+        "b_x": (0.006, 0.02),
+        "b_z": (0.006, 0.02),
+    },
+    draw=draw_kick,
 )

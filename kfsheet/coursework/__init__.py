@@ -1,0 +1,1 @@
+"""Assignments for every student, and their grading."""

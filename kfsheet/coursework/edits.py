@@ -1,0 +1,104 @@
+"""Cells that were not to be changed, and were: worth a remark, since no mark depends on them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import isclose, isnan
+
+from openpyxl.utils import get_column_letter
+
+from kfsheet.coursework.judge import asked_steps
+from kfsheet.coursework.meaning import Interpreter
+from kfsheet.coursework.places import Places
+from kfsheet.coursework.submission import Book, Content, Formula
+from kfsheet.coursework.worlds import Own
+from kfsheet.errors import FormulaError
+from kfsheet.excel.compose import Piece, Run, section_page
+from kfsheet.excel.layout import Address, Layout
+from kfsheet.excel.workbook import is_formula
+from kfsheet.exercise import Exercise
+
+SAMPLE = 40  # rows of a long table that are looked at
+
+
+def edits(exercise: Exercise, book: Book, places: Places, own: Own) -> list[str]:
+    """Names of parameters, data and given columns that differ from what was handed out."""
+    return [
+        *_parameters(book, places, own),
+        *_data(exercise, book, places, own),
+        *_formulas(exercise, book, places),
+    ]
+
+
+def _content(book: Book, address: Address | None) -> Content | None:
+    return book.sheets[address[0]].get(address[1:]) if address else None
+
+
+def _same(found: Content | None, wanted: float) -> bool:
+    if isnan(wanted):
+        return found in (None, "")
+    return type(found) is float and isclose(found, wanted, rel_tol=1e-9)
+
+
+def _parameters(book: Book, places: Places, own: Own) -> Iterator[str]:
+    for name, value in own.parameters:
+        if not _same(_content(book, places.address(name)), value):
+            yield name
+
+
+def _data(exercise: Exercise, book: Book, places: Places, own: Own) -> Iterator[str]:
+    for name, values in own.data:
+        found = (_content(book, places.address(name, step)) for step in range(exercise.model.rows))
+        if not all(map(_same, found, values)):
+            yield name
+
+
+def _formulas(exercise: Exercise, book: Book, places: Places) -> Iterator[str]:
+    asked = {q.name for q in exercise.questions}
+    interpreter, (given, original) = Interpreter(book, places), _original(exercise)
+    for column in exercise.model.table.values():
+        if column.is_data or column.name in asked:
+            continue
+        steps = asked_steps(exercise.model, column.name)
+        for step in steps[:: max(1, len(steps) // SAMPLE)]:
+            found = places.address(column.name, step)
+            wanted = given.meaning(original.address(column.name, step), step)
+            try:
+                same = found and interpreter.meaning(found, step) == wanted
+            except FormulaError:
+                same = False
+            if not same:
+                yield column.name
+                break
+
+
+_originals: dict[str, tuple[Interpreter, Places]] = {}
+
+
+def _original(exercise: Exercise) -> tuple[Interpreter, Places]:
+    """The tables as they are handed out, to be read like those that come back."""
+    if exercise.name not in _originals:
+        layout = Layout.standard(exercise.model)
+        book = Book("")
+        now = Run.of(exercise.model)
+        for page in (section_page(layout, section, now) for section in exercise.model.sections):
+            book.sheets[page.title] = {
+                cell: Formula(piece.content, cell) if is_formula(piece.content) else _plain(piece)
+                for cell, piece in page.pieces.items()
+                if piece.content is not None
+            }
+        book.sheets["Parameters"] = {}
+        book.names = {n.lower(): _reference(address) for n, address in layout.scalars.items()}
+        places = Places.find(book, exercise.model)
+        _originals[exercise.name] = (Interpreter(book, places), places)
+    return _originals[exercise.name]
+
+
+def _reference(address: Address) -> str:
+    sheet, row, column = address
+    return f"{sheet}!${get_column_letter(column)}${row}"
+
+
+def _plain(piece: Piece) -> Content:
+    content = piece.content
+    return float(content) if isinstance(content, int | float) else str(content)

@@ -1,0 +1,221 @@
+"""A folder of submissions -> one result for every student on the roster."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import kfsheet
+from kfsheet.coursework import tokens
+from kfsheet.coursework.assessing import GRADED, NO_TOKEN, OTHER, Assessment, assess
+from kfsheet.coursework.collecting import owner, submitted_files
+from kfsheet.coursework.judge import Mark
+from kfsheet.coursework.roster import Student
+from kfsheet.coursework.workers import SECONDS, Failed, Pool
+from kfsheet.exercise import Exercise
+from kfsheet.files import write_file
+
+MISSING, FOREIGN = "no submission", "somebody else's file"
+TIMED_OUT, CRASHED = "timed out", "crashed"
+STATUSES = {
+    GRADED: "the answers were judged; see the marks",
+    "untouched": "the workbook came back with no answer filled in",
+    MISSING: "nothing came back",
+    FOREIGN: "the file was handed out to another student; it does not count",
+    NO_TOKEN: "the file was not handed out to anybody, or its token was removed",
+    OTHER: "the file belongs to another exercise",
+    "empty file": "the file has 0 bytes",
+    "wrong kind": "the file is no .xlsx workbook, whatever its name says",
+    "damaged": "the workbook cannot be opened",
+    "encrypted": "the workbook has a password",
+    "too large": "the file, or what it unpacks to, exceeds the limits",
+    "refused": "the file holds macros or tricks",
+    "unreadable": "the file could not be read from the disk",
+    TIMED_OUT: "judging took longer than a submission may; look at it by hand",
+    CRASHED: "reading the file ended its process; look at it by hand",
+}
+"""Every status of a submission, and what it means."""
+
+
+@dataclass
+class Result:
+    """What one student gets."""
+
+    student: Student
+    maximum: int
+    status: str = MISSING
+    remark: str = ""
+    marks: list[Mark] = field(default_factory=list)
+    path: Path | None = None
+    key: str = ""
+    feedback: bool = False
+    override: float | None = None
+
+    @property
+    def score(self) -> float:
+        """Points, a lecturer's own total included."""
+        return sum(m.score for m in self.marks) if self.override is None else self.override
+
+
+@dataclass(frozen=True)
+class Handed:
+    """One file: where it lay, whose folder or name it carried, what it is worth."""
+
+    path: Path
+    owner: Student | None
+    key: str
+    assessment: Assessment
+
+
+def grade(
+    exercise: Exercise,
+    spec: str,
+    submissions: str | Path,
+    students: Sequence[Student],
+    secret: bytes,
+    out: str | Path,
+    *,
+    jobs: int = 1,
+    seconds: float = SECONDS,
+    progress: Callable[[Iterable, int], Iterable] = lambda items, _: items,
+) -> tuple[list[Result], list[Handed]]:
+    """Judge every file once, and say what every student gets.
+
+    Parameters
+    ----------
+    exercise, spec : Exercise, str
+        The exercise, and the name or file by which a worker process finds it.
+    submissions : path
+        Folder of what came back; whose a file is comes from its token.
+    students : sequence of Student
+        The roster.
+    secret : bytes
+        That of the handout.
+    out : path
+        Results of each file are kept in ``work/`` there, so that a second run goes on where the
+        first one stopped.
+    jobs : int
+        Processes.
+    seconds : float
+        What one file may take.
+    progress : function, optional
+        Wraps the files as they are finished; called with them and their number.
+
+    Returns
+    -------
+    tuple
+        A result for each student, in the order of the roster, and every file.
+    """
+    folder, out = Path(submissions), Path(out)
+    files = submitted_files(folder)
+    keys = {path: _key(path, exercise, secret) for path in files}
+    judged = _judged(keys, spec, secret, out / "work", (jobs, seconds), progress)
+    handed = [
+        Handed(path, owner(path, folder, students), keys[path], judged[keys[path]])
+        for path in files
+    ]
+    maximum = sum(question.points for question in exercise.questions)
+    return [_result(student, handed, maximum) for student in students], handed
+
+
+def _key(path: Path, exercise: Exercise, secret: bytes) -> str:
+    """Names a result: by what the file holds, not by where it lies."""
+    content = hashlib.sha256()
+    try:
+        with path.open("rb") as file:
+            for block in iter(lambda: file.read(2**20), b""):
+                content.update(block)
+    except OSError:
+        content.update(str(path).encode())
+    questions = repr(exercise.questions)
+    parts = ("key", exercise.name, questions, kfsheet.__version__, content.hexdigest())
+    return tokens.digest(secret, *parts).hex()[:32]
+
+
+def _judged(
+    keys: dict[Path, str],
+    spec: str,
+    secret: bytes,
+    work: Path,
+    limits: tuple[int, float],
+    progress: Callable[[Iterable, int], Iterable],
+) -> dict[str, Assessment]:
+    known = {key: found for key in keys.values() if (found := _kept(work, key))}
+    new = {key: path for path, key in keys.items() if key not in known}
+    tasks = [(spec, secret, path, work / f"{key}.xlsx") for key, path in new.items()]
+    names = {path: key for key, path in new.items()}
+    pool = Pool(assess, limits[0], seconds=limits[1])
+    for task, found in progress(pool.run(tasks), len(tasks)):
+        key = names[task[2]]
+        known[key] = _failed(found) if isinstance(found, Failed) else found
+        if not isinstance(found, Failed):
+            write_file(work / f"{key}.json", json.dumps(found.as_dict()).encode())
+    return known
+
+
+def _kept(work: Path, key: str) -> Assessment | None:
+    """The result of an earlier run; one that was damaged is made anew."""
+    try:
+        return Assessment.from_dict(json.loads((work / f"{key}.json").read_text()))
+    except (OSError, ValueError, TypeError, KeyError):
+        return None
+
+
+def _failed(found: Failed) -> Assessment:
+    status = TIMED_OUT if found.reason == "timed out" else CRASHED
+    return Assessment(status, f"{STATUSES[status]} ({found.reason})")
+
+
+def _result(student: Student, handed: list[Handed], maximum: int) -> Result:
+    """The newest file with the student's token that lay in nobody else's folder, or what else."""
+    own = [h for h in handed if h.assessment.student == student.id and h.owner in (None, student)]
+    if own:
+        return _of_file(student, _newest(own), maximum, len(own))
+    carried = [h for h in handed if h.owner == student]
+    if not carried:
+        return Result(student, maximum, remark=_elsewhere(student, handed))
+    newest = _newest(carried)
+    if newest.assessment.student:
+        words = "the file carries the token of another student; it was not graded for this one"
+        return Result(student, maximum, FOREIGN, words, path=newest.path, key=newest.key)
+    return _of_file(student, newest, maximum, len(carried))
+
+
+def _newest(files: list[Handed]) -> Handed:
+    return max(files, key=lambda h: (h.path.stat().st_mtime, str(h.path)))
+
+
+def _of_file(student: Student, file: Handed, maximum: int, count: int) -> Result:
+    found = file.assessment
+    remarks = [found.remark] if found.remark else []
+    if count > 1:
+        remarks.append(f"{count} files came back; the newest counts ({file.path.name})")
+    return Result(
+        student, maximum, found.status, "; ".join(remarks), found.marks, file.path, file.key,
+        found.feedback,
+    )  # fmt: skip
+
+
+def _elsewhere(student: Student, handed: list[Handed]) -> str:
+    others = {h.owner.id for h in handed if h.assessment.student == student.id and h.owner}
+    return f"this student's file came back from {', '.join(sorted(others))}" if others else ""
+
+
+def override(results: list[Result], lines: Iterator[dict[str, Any]]) -> list[Result]:
+    """Put a lecturer's own marks in: by id and question, or the total where that is empty."""
+    by_id = {result.student.id: result for result in results}
+    for line in lines:
+        result = by_id[line["id"]]
+        remark = line.get("remark") or "changed by the lecturer"
+        if not line["question"]:
+            result.override, result.remark = line["score"], remark
+            continue
+        result.marks = [
+            replace(m, score=line["score"], remark=remark) if m.name == line["question"] else m
+            for m in result.marks
+        ]
+    return results

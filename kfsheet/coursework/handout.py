@@ -1,0 +1,189 @@
+"""A workbook for every student: own numbers, empty answers, live feedback, a signed token."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from io import BytesIO
+from pathlib import Path
+
+from openpyxl.formatting.rule import CellIsRule
+from openpyxl.packaging.custom import StringProperty
+from openpyxl.styles import PatternFill, Protection
+from openpyxl.utils import get_column_letter
+from openpyxl.workbook import Workbook
+from openpyxl.worksheet.dimensions import ColumnDimension
+from openpyxl.worksheet.worksheet import Worksheet
+
+from kfsheet.coursework import tokens
+from kfsheet.coursework.judge import asked_steps
+from kfsheet.coursework.questions import (
+    FIRST,
+    HIDDEN,
+    LOOKS_RIGHT,
+    SHEET,
+    hide,
+    question_pages,
+)
+from kfsheet.coursework.roster import Student
+from kfsheet.coursework.variation import own_numbers
+from kfsheet.coursework.worlds import Own
+from kfsheet.errors import ModelError
+from kfsheet.excel.compose import Page, Piece, Run
+from kfsheet.excel.finish import Value, finish
+from kfsheet.excel.layout import FIRST_ROW, Layout
+from kfsheet.excel.recalculate import recalculate
+from kfsheet.excel.workbook import assemble, built_bytes, compose, is_formula
+from kfsheet.exercise import Exercise
+from kfsheet.files import write_file
+from kfsheet.names import LAST_COLUMN
+
+TOKEN_PROPERTY = "kfsheet token"
+
+
+def write_handouts(
+    exercise: Exercise, students: list[Student], secret: bytes, out: str | Path
+) -> Iterator[Path]:
+    """Write every student's workbook and its solution, one student at a time.
+
+    Parameters
+    ----------
+    exercise : Exercise
+        It must list questions.
+    students : list of Student
+        Who gets one.
+    secret : bytes
+        See :mod:`kfsheet.coursework.tokens`.
+    out : path
+        Folder; ``students/ID/EXERCISE.xlsx`` and ``solutions/ID/EXERCISE.xlsx`` are written there.
+
+    Yields
+    ------
+    Path
+        Each student's workbook, once both files are written.
+
+    Raises
+    ------
+    ModelError
+        If the exercise asks nothing.
+    WorkbookError
+        If a file cannot be written.
+    """
+    if not exercise.questions:
+        raise ModelError(f"{exercise.name} asks no questions; list them in Exercise(questions=...)")
+    for student in students:
+        own = own_numbers(exercise, secret, student.id)
+        solution = Path(out) / "solutions" / student.id / f"{exercise.name}.xlsx"
+        write_file(solution, solution_bytes(exercise, own))
+        path = Path(out) / "students" / student.id / f"{exercise.name}.xlsx"
+        yield write_file(path, handout_bytes(exercise, student, secret))
+
+
+def own_run(exercise: Exercise, own: Own) -> Run:
+    """The model with a student's numbers."""
+    return Run.of(exercise.model, dict(own.data), dict(own.parameters))
+
+
+def solution_bytes(exercise: Exercise, own: Own) -> bytes:
+    """The complete workbook with a student's numbers."""
+    return built_bytes(exercise, Layout.standard(exercise.model), own_run(exercise, own))
+
+
+def handout_bytes(exercise: Exercise, student: Student, secret: bytes) -> bytes:
+    """A student's workbook; the same bytes for the same secret, exercise and student."""
+    layout = Layout.standard(exercise.model)
+    now = own_run(exercise, own_numbers(exercise, secret, student.id))
+    pages = handout_pages(exercise, layout, now)
+    pages[1:1] = question_pages(exercise, layout, now, secret, (student.id, student.name))
+    pages.append(pages.pop(2))  # the hidden sheet last
+    book = assemble(exercise, layout, pages, now)
+    _finish_book(book, exercise, layout, tokens.token(secret, exercise.name, student.id))
+    saved = BytesIO()
+    book.save(saved)
+    return finish(saved.getvalue(), _calculated(saved.getvalue(), pages))
+
+
+def handout_pages(exercise: Exercise, layout: Layout, now: Run) -> list[Page]:
+    """The exercise's worksheets with empty answers, without "Check", which knows the answers."""
+    pages = [p for p in compose(exercise, layout, now, now) if p.title != "Check"]
+    by_title = {page.title: page for page in pages}
+    for question in exercise.questions:
+        words = f"{question.points} point{'s' * (question.points > 1)}: {question.hint}"
+        if question.name in layout.scalars:
+            sheet, row, column = layout.scalars[question.name]
+            _empty(by_title[sheet], (row, column))
+            by_title[sheet].put(row, column + 2, words, "words", align="wrap")
+            continue
+        sheet, column = layout.home(question.name)
+        by_title[sheet].put(3, column, words, "words", align="wrap")
+        by_title[sheet].heights[3] = 90
+        for step in asked_steps(exercise.model, question.name):
+            _empty(by_title[sheet], (FIRST_ROW + step, column))
+    _mend_read_me(by_title["Read me"])
+    return pages
+
+
+def _empty(page: Page, place: tuple[int, int]) -> None:
+    page.pieces[place] = Piece(None, "answer", format=page.pieces[place].format)
+
+
+def _mend_read_me(page: Page) -> None:
+    """The words about the sheet "Check", which handouts lack, become words about the questions."""
+    for (row, column), piece in list(page.pieces.items()):
+        if piece.content == "Check" and piece.kind == "index":
+            page.put(row, column, SHEET, "index")
+            page.put(row, column + 1, "what to fill in, and whether it looks right", align="wrap")
+        if piece.kind == "formula" and column == 1:
+            page.put(row + 1, 1, "answer", "answer")
+            page.put(row + 1, 2, "an answer: fill in a formula", align="wrap")
+
+
+def _finish_book(book: Workbook, exercise: Exercise, layout: Layout, token: str) -> None:
+    book.custom_doc_props.append(StringProperty(name=TOKEN_PROPERTY, value=token))
+    fill = PatternFill("solid", start_color="FFC6EFCE", end_color="FFC6EFCE")
+    rule = CellIsRule(operator="equal", formula=[f'"{LOOKS_RIGHT}"'], fill=fill)
+    area = f"H{FIRST}:H{FIRST + len(exercise.questions) - 1}"
+    book[SHEET].conditional_formatting.add(area, rule)
+    hide(book)
+    for sheet in book.worksheets:
+        _protect(sheet)
+    book.active = book.sheetnames.index(SHEET)
+
+
+def _protect(sheet: Worksheet) -> None:
+    """Lock what is there; free cells beside it, and rows and columns to insert, stay open."""
+    protection = sheet.protection
+    protection.sheet = True
+    protection.formatCells = protection.formatColumns = protection.formatRows = False
+    protection.insertColumns = protection.insertRows = False
+    if sheet.title == HIDDEN:
+        return
+    width = sheet.max_column
+    for column in range(1, width + 1):
+        letter = get_column_letter(column)
+        sheet.column_dimensions[letter].protection = Protection(locked=False)
+    rest = ColumnDimension(
+        sheet, index=get_column_letter(width + 1), min=width + 1, max=LAST_COLUMN, width=13
+    )
+    rest.protection = Protection(locked=False)
+    sheet.column_dimensions[rest.index] = rest
+
+
+def _calculated(saved: bytes, pages: list[Page]) -> dict[str, dict[str, Value]]:
+    """What an engine finds in a workbook whose answers are still empty, to be stored in it."""
+    with tempfile.TemporaryDirectory(prefix="kfsheet-") as folder:
+        path = Path(folder) / "handout.xlsx"
+        path.write_bytes(saved)
+        values = recalculate(path)
+    return {
+        f"xl/worksheets/sheet{n}.xml": {
+            f"{get_column_letter(column)}{row}": _or_empty(values[page.title].get((row, column)))
+            for (row, column), piece in page.pieces.items()
+            if is_formula(piece.content)
+        }
+        for n, page in enumerate(pages, 1)
+    }
+
+
+def _or_empty(value: Value) -> Value:
+    return "" if value is None else value

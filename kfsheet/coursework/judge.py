@@ -1,0 +1,352 @@
+"""Marks: what each answer of a workbook is worth, and what kind of mistake is in it.
+
+Every row of a question is judged by its formula alone; equal formulas are judged once. A formula
+that cannot be read as mathematics is handed to ``recalculated``, which asks a spreadsheet engine.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+
+from openpyxl.utils import get_column_letter
+from sympy import Basic, Indexed
+
+from kfsheet.coursework.comparing import Question, question
+from kfsheet.coursework.meaning import Interpreter, parsed
+from kfsheet.coursework.mutations import MOST, mutations
+from kfsheet.coursework.places import Places
+from kfsheet.coursework.submission import Book, Formula
+from kfsheet.coursework.worlds import Own, Scene
+from kfsheet.errors import FormulaError
+from kfsheet.excel.layout import Address
+from kfsheet.excel.references import Reference
+from kfsheet.exercise import Exercise
+from kfsheet.exercise import Question as Asked
+from kfsheet.expressions import Aggregate, Missing, lag, t
+from kfsheet.recurrence import Recurrence
+
+RIGHT, EMPTY, TYPED, WRONG = "right", "empty", "typed", "wrong"
+HARD_CODED, PARTLY, GAPS, ROUNDED = "hard-coded", "partly right", "gaps forgotten", "rounded"
+REFUSED, UNREADABLE, GONE = "refused", "unreadable", "gone"
+CREDIT = {RIGHT: 1.0, HARD_CODED: 0.5, PARTLY: 0.5, GAPS: 0.5, ROUNDED: 0.5}
+"""Share of the points by status; what is not listed gets none."""
+DANGEROUS = frozenset(
+    "WEBSERVICE HYPERLINK INDIRECT DDE RTD CALL REGISTER.ID FILTERXML IMAGE IMPORTXML IMPORTDATA "
+    "IMPORTHTML IMPORTRANGE IMPORTFEED CUBEVALUE EXEC SQL.REQUEST".split()
+)
+FARTHEST = 8  # rows back; a key looks one or two rows back
+
+
+@dataclass(frozen=True)
+class Mark:
+    """What one question is worth, why, and a fingerprint that equal wrong answers share."""
+
+    name: str
+    points: int
+    score: float
+    status: str
+    remark: str
+    fingerprint: str = ""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One row of an answer: what was found there."""
+
+    step: int
+    address: Address
+    status: str
+    expression: Basic | None = None
+    fixed: tuple[int, ...] = ()
+    words: str = ""
+
+
+Recalculated = Callable[[str], dict[int, bool]]
+"""Right or wrong by step, found by a spreadsheet engine, of the answer of that name."""
+
+
+def asked_steps(model: Recurrence, name: str) -> list[int]:
+    """Steps in which an answer is asked for; a derived scalar has the one step 0."""
+    if name in model.derived_scalars:
+        return [0]
+    column = model.column(name)
+    return [k for k in range(model.rows) if column.definition(k) is not Missing]
+
+
+class Judge:
+    """Judges one workbook."""
+
+    def __init__(
+        self, exercise: Exercise, scene: Scene, book: Book, own: Own, recalculated: Recalculated
+    ) -> None:
+        self._model, self._scene, self._own = exercise.model, scene, own
+        self.book, self._recalculated = book, recalculated
+        self.places = Places.find(book, exercise.model)
+        self._interpreter = Interpreter(book, self.places)
+        self._exercise = exercise
+        self._verdicts: dict[tuple, tuple[str, str]] = {}
+
+    def marks(self) -> list[Mark]:
+        """One mark for each question."""
+        return [self._mark(asked) for asked in self._exercise.questions]
+
+    def _mark(self, asked: Asked) -> Mark:
+        cells = [self._read(asked.name, step) for step in asked_steps(self._model, asked.name)]
+        if any(cell is None for cell in cells):
+            words = "the table or the label of this answer is gone; hand in a file that has it"
+            return Mark(asked.name, asked.points, 0.0, GONE, words)
+        if any(cell.status == UNREADABLE for cell in cells):
+            found = self._recalculated(asked.name)
+            cells = [_decided(cell, found) for cell in cells]
+        return self._marked(asked, cells)
+
+    def _read(self, name: str, step: int) -> Cell | None:
+        address = self.places.address(name, step)
+        if address is None:
+            return None
+        content = self.book.sheets[address[0]].get(address[1:])
+        if content is None or content == "":
+            return Cell(step, address, EMPTY)
+        if not isinstance(content, Formula):
+            return Cell(step, address, TYPED)
+        if called := _dangerous(content.text):
+            return Cell(step, address, REFUSED, words=f"{called} is not allowed")
+        try:
+            meaning = self._interpreter.meaning(address, step)
+        except FormulaError as error:
+            return Cell(step, address, UNREADABLE, words=str(error))
+        lagged = as_lags(meaning.expression, step) if meaning.fixed_rows else meaning.expression
+        key = (name, lagged, self._rule(name, step))
+        if key not in self._verdicts:
+            self._verdicts[key] = self._judged(name, Cell(step, address, WRONG, lagged))
+        status, words = self._verdicts[key]
+        expression = None if status in (UNREADABLE, TYPED) else meaning.expression
+        return Cell(step, address, status, expression, meaning.fixed_rows, words)
+
+    def _rule(self, name: str, step: int) -> int:
+        """Number of the rule that holds in a step: a start value, or the general one."""
+        if name in self._model.derived_scalars:
+            return 0
+        return min(step, len(self._model.column(name).start))
+
+    def _judged(self, name: str, cell: Cell) -> tuple[str, str]:
+        if cell.expression.has(Aggregate):
+            return UNREADABLE, "it takes a whole column"
+        if not cell.expression.free_symbols and self._reads_nothing(cell):
+            return TYPED, ""
+        if farthest(cell.expression) > FARTHEST:
+            return WRONG, ""
+        steps = _judged_in(self._model, name, cell.step)
+        right = all(is_right(self._scene, name, step, cell.expression) for step in steps)
+        return RIGHT if right else WRONG, ""
+
+    def _reads_nothing(self, cell: Cell) -> bool:
+        content = self.book.sheets[cell.address[0]][cell.address[1:]]
+        return not parsed(content)[1]
+
+    # -- from cells to a mark --------------------------------------------------------------
+
+    def _marked(self, asked: Asked, cells: list[Cell]) -> Mark:
+        right = [c for c in cells if c.status == RIGHT]
+        rest = [c for c in cells if c.status != RIGHT]
+        if not rest:
+            return Mark(asked.name, asked.points, float(asked.points), RIGHT, "")
+        culprit, words, fingerprint = self._diagnosis(asked.name, rest)
+        status = culprit.status
+        if right and len(right) >= len(rest):
+            status = PARTLY
+            words = f"right in {_rows(right)}; {self._where(rest, right)}: {words}"
+        score = asked.points * CREDIT.get(status, 0.0)
+        return Mark(asked.name, asked.points, score, status, words, fingerprint)
+
+    def _diagnosis(self, name: str, rest: list[Cell]) -> tuple[Cell, str, str]:
+        """The most frequent kind of cell that is not right, in words."""
+        counts = Counter((c.status, c.expression, c.words) for c in rest)
+        (status, expression, words), _ = counts.most_common(1)[0]
+        culprit = next(
+            c for c in rest if (c.status, c.expression, c.words) == (status, expression, words)
+        )
+        if expression is None:
+            return culprit, words or PLAIN_WORDS[status], ""
+        if culprit.fixed:
+            expression = as_lags(expression, culprit.step)
+        steps = _judged_in(self._model, name, culprit.step)
+        step = next((k for k in steps if not is_right(self._scene, name, k, expression)), steps[0])
+        status, words, fingerprint = diagnose(self._scene, name, step, expression, self._own)
+        if status == WRONG and culprit.fixed and len(rest) > 1:
+            words = f"every row refers to {self._fixed_words(culprit)}; {words}"
+        return Cell(culprit.step, culprit.address, status), words, fingerprint
+
+    def _where(self, rest: list[Cell], right: list[Cell]) -> str:
+        first = rest[0]
+        content = self.book.sheets[first.address[0]].get(first.address[1:])
+        if not isinstance(content, Formula):
+            return f"not in {_rows(rest)}"
+        usual = self.book.sheets[right[-1].address[0]][right[-1].address[1:]]
+        known = set(parsed(usual)[1])
+        try:
+            strange = [r for r in parsed(content)[1] if r not in known]
+        except FormulaError:
+            strange = []
+        names = ", ".join(dict.fromkeys(_show(r, first.address[1:]) for r in strange))
+        return f"not in {_rows(rest)}" + (
+            f" (row {first.address[1]} refers to {names})" * bool(names)
+        )
+
+    def _fixed_words(self, cell: Cell) -> str:
+        content = self.book.sheets[cell.address[0]][cell.address[1:]]
+        fixed = (r for r in parsed(content)[1] if r.first and r.first.row_fixed)
+        shown = (
+            _show(r, cell.address[1:])
+            for r in fixed
+            if isinstance(
+                self.places.role(
+                    (r.sheet or cell.address[0], r.first.row, r.first.at(cell.address[1:])[1])
+                ),
+                tuple,
+            )
+        )
+        return ", ".join(dict.fromkeys(shown)) or "a fixed row"
+
+
+PLAIN_WORDS = {
+    EMPTY: "empty",
+    TYPED: "a number stands where a formula is asked for; it will not move with the parameters",
+    UNREADABLE: "the formula could not be judged",
+    WRONG: "the formula gives another value than the right one",
+}
+
+
+def _decided(cell: Cell, found: dict[int, bool]) -> Cell:
+    if cell.status != UNREADABLE or cell.step not in found:
+        return cell
+    return Cell(
+        cell.step,
+        cell.address,
+        RIGHT if found[cell.step] else WRONG,
+        words=(
+            ""
+            if found[cell.step]
+            else f"recalculated, since {cell.words}: other values than the key"
+        ),
+    )
+
+
+def as_lags(expression: Basic, step: int) -> Basic:
+    """The same cells as rows above ``step``: ``x[3]`` is ``x[t - 1]`` in step 4."""
+    cells = {c for c in expression.atoms(Indexed) if c.indices[0].is_Integer}
+    return expression.xreplace({c: c.base[t - (step - int(c.indices[0]))] for c in cells})
+
+
+def farthest(expression: Basic) -> int:
+    """How many rows away the farthest cell is that an expression reads."""
+    return max((abs(int(lag(c))) for c in expression.atoms(Indexed)), default=0)
+
+
+def _judged_in(model: Recurrence, name: str, step: int) -> list[int]:
+    """Steps in which a formula is judged for all rows that hold it."""
+    if name in model.derived_scalars:
+        return [0]
+    starts = len(model.column(name).start)
+    if step < starts:
+        return [step]
+    return sorted({starts, (starts + model.rows - 1) // 2, model.rows - 1})
+
+
+@lru_cache(maxsize=200_000)
+def is_right(scene: Scene, name: str, step: int, expression: Basic) -> bool:
+    """Whether an expression is the key's function in a step."""
+    return question(scene, name, step).same(expression)
+
+
+@lru_cache(maxsize=20_000)
+def diagnose(
+    scene: Scene, name: str, step: int, expression: Basic, own: Own
+) -> tuple[str, str, str]:
+    """Status, words and fingerprint of a wrong formula."""
+    asked = question(scene, name, step)
+    values = asked.values(expression)
+    fingerprint = hashlib.sha256("/".join((name, *values)).encode()).hexdigest()[:12]
+    parameters = Own(own.parameters)
+    if asked.same(expression, parameters):
+        names = ", ".join(_still(asked, expression, own)) or "a parameter"
+        words = f"right only as long as {names} keeps its value: a number stands in its place"
+        return HARD_CODED, words, fingerprint
+    if asked.same(expression, gaps=False):
+        words = "right where there is an observation, wrong where one is missing"
+        return GAPS, words, fingerprint
+    if asked.same(expression, own):
+        return HARD_CODED, "a number from the data stands where its cell belongs", fingerprint
+    if asked.nearly(expression):
+        return ROUNDED, "nearly right: a constant in it is rounded", fingerprint
+    return WRONG, _words_of(scene, name, step, expression, values), fingerprint
+
+
+def _still(asked: Question, expression: Basic, own: Own) -> list[str]:
+    """Parameters that the formula should follow and does not."""
+    found = []
+    for name, _ in own.parameters:
+        others = Own(tuple(p for p in own.parameters if p[0] != name))
+        if not asked.same(expression, others):
+            found.append(name)
+    return found
+
+
+def _words_of(scene: Scene, name: str, step: int, expression: Basic, values: Sequence[str]) -> str:
+    if name in scene.model.table and expression.has(scene.model[name][t]):
+        return "the formula refers to its own cell"
+    known = known_mistakes(scene, name, step).get(tuple(values))
+    return known or PLAIN_WORDS[WRONG]
+
+
+@lru_cache(maxsize=2_000)
+def known_mistakes(scene: Scene, name: str, step: int) -> dict[tuple[str, ...], str]:
+    """Words by the values that a mutated key has; without those that change nothing."""
+    asked = question(scene, name, step)
+    found: dict[tuple[str, ...], str] = {}
+    for n, (words, key) in enumerate(mutations(scene.model, asked.key)):
+        if n >= MOST:
+            break
+        found.setdefault(asked.values(key), words)
+    found.pop(asked.values(asked.key), None)
+    return found
+
+
+def _dangerous(text: str) -> str | None:
+    upper = text.upper()
+    found = (name for name in DANGEROUS if f"{name}(" in upper)
+    return next(found, "DDE" if "|" in text and "!" in text else None)
+
+
+def _rows(cells: list[Cell]) -> str:
+    """Rows of a sheet in words: "rows 6-13, 15"."""
+    numbers = sorted(cell.address[1] for cell in cells)
+    runs: list[list[int]] = [[numbers[0]]]
+    for before, now in pairwise(numbers):
+        if now == before + 1:
+            runs[-1].append(now)
+        else:
+            runs.append([now])
+    shown = [f"{run[0]}-{run[-1]}" if len(run) > 1 else str(run[0]) for run in runs]
+    more = ", ..." if len(shown) > 5 else ""
+    return f"row{'s' * (len(numbers) > 1)} {', '.join(shown[:5])}{more}"
+
+
+def _show(reference: Reference, host: tuple[int, int]) -> str:
+    """A reference as the student typed it."""
+    if reference.name:
+        return reference.name
+    shown = []
+    for corner in filter(None, (reference.first, reference.last)):
+        row, column = corner.at(host)
+        if row < 1 or column < 1:
+            return "a cell outside the sheet"
+        shown.append(
+            f"{'$' * corner.column_fixed}{get_column_letter(column)}{'$' * corner.row_fixed}{row}"
+        )
+    return (f"{reference.sheet}!" if reference.sheet else "") + ":".join(shown)

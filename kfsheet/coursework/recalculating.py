@@ -1,0 +1,103 @@
+"""Formulas that cannot be read as mathematics are judged by what a spreadsheet engine computes.
+
+The inputs of an answer, and every column beside it, are replaced by random numbers, the same that
+formulas are compared at; an engine calculates the workbook from nothing; and what it finds in the
+answer's cells must be what the key gives there. Several times, so that no accident counts.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+import mpmath
+from sympy import Basic
+
+from kfsheet.coursework.arithmetic import MISSING, Value
+from kfsheet.coursework.comparing import ERROR, difference, question, worth
+from kfsheet.coursework.judge import asked_steps
+from kfsheet.coursework.places import Places
+from kfsheet.coursework.worlds import ALONE, Scene, World, cell_of
+from kfsheet.errors import KfsheetError
+from kfsheet.excel.recalculate import Changes, Values, recalculate
+
+RUNS = (0, 2, 4, 6, 1, 3)
+"""Numbers of the worlds: four near the model's own run, two anywhere."""
+HUGE = 1e12  # where a column feeds itself with numbers from anywhere, it may grow beyond sense
+TOLERANCE = 1e-9
+FEWEST = 3
+"""Runs in which an answer must have a number to be called right."""
+
+
+def recalculated(path: Path, scene: Scene, places: Places, name: str) -> dict[int, bool]:
+    """Whether each step of an answer has the key's value in every run; {} if no engine can tell."""
+    steps = asked_steps(scene.model, name)
+    good, counts = dict.fromkeys(steps, True), dict.fromkeys(steps, 0)
+    for number in RUNS:
+        world = _world(scene, number)
+        try:
+            values = recalculate(path, "ironcalc", _changes(scene, places, name, world))
+        except KfsheetError:
+            return {}
+        live = _Live(world, values, places, name)
+        for step in steps:
+            live.row = step
+            wanted = worth(question(scene, name, step).key, live)
+            found = live.found(step)
+            far = difference(found, wanted)
+            senseless = isinstance(wanted, mpmath.mpf) and abs(wanted) > HUGE
+            if far is None or (world.wild and (ERROR in (found, wanted) or senseless)):
+                continue
+            good[step] &= far <= TOLERANCE
+            counts[step] += isinstance(wanted, mpmath.mpf)
+    return {step: good[step] and counts[step] >= FEWEST for step in steps}
+
+
+@lru_cache(maxsize=len(RUNS))
+def _world(scene: Scene, number: int) -> World:
+    return World(scene, 0, ALONE, number)
+
+
+def _changes(scene: Scene, places: Places, name: str, world: World) -> Changes:
+    """Random numbers for every cell of the model but those of the answer itself."""
+    changes: Changes = {}
+    model = scene.model
+
+    def put(address: tuple[str, int, int] | None, value: Value) -> None:
+        if address:
+            missing = value is None or value is MISSING
+            changes.setdefault(address[0], {})[address[1:]] = None if missing else float(value)
+
+    for other in (*model.parameters, *model.derived_scalars):
+        if other != name:
+            put(places.address(other), world(model[other], 0))
+    for column in model.table.values():
+        if column.name != name:
+            for step in range(model.rows):
+                put(places.address(column.name, step), world.cell(column.name, step))
+    return changes
+
+
+class _Live:
+    """A world in which the answer's own column holds what the engine found."""
+
+    wild = gaps = False
+
+    def __init__(self, world: World, values: Values, places: Places, name: str) -> None:
+        self._world, self._values, self._places, self._name = world, values, places, name
+        self.row = 0
+
+    def __call__(self, node: Basic, row: int) -> Value:
+        if not node.is_Symbol:
+            name, fixed, place = cell_of(node)
+            if name == self._name:
+                return self.found(place if fixed else row - place)
+        return self._world(node, row)
+
+    def found(self, step: int) -> Value | str:
+        """What the engine found in a cell of the answer."""
+        address = self._places.address(self._name, step)
+        value = self._values.get(address[0], {}).get(address[1:]) if address else None
+        if isinstance(value, bool) or (isinstance(value, str) and value.startswith("#")):
+            return ERROR
+        return mpmath.mpf(value) if isinstance(value, int | float) else MISSING

@@ -1,0 +1,139 @@
+"""Processes that judge one file at a time, within limits of memory and time.
+
+A file that crashes its process, or takes too long, costs that process only: another one takes its
+place and goes on with the next file.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from typing import Any
+
+MEMORY = 3 * 2**30  # bytes of address space
+SECONDS = 120.0
+
+
+READY = "ready"
+
+
+@dataclass
+class _Worker:
+    process: multiprocessing.process.BaseProcess
+    pipe: Connection
+    task: Any = None
+    ready: bool = False
+    deadline: float = float("inf")
+
+
+@dataclass(frozen=True)
+class Failed:
+    """A task whose process ended or was stopped."""
+
+    reason: str
+
+
+def _serve(pipe: Connection, function: Callable[..., Any], memory: int) -> None:
+    _limit(memory)
+    pipe.send(READY)
+    while (arguments := pipe.recv()) is not None:
+        try:
+            pipe.send(function(*arguments))
+        except Exception as error:  # a defect of ours must not stop the others
+            pipe.send(Failed(f"{type(error).__name__}: {error}"))
+
+
+def _limit(memory: int) -> None:
+    if sys.platform != "linux":
+        return  # the limit of time has to do
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+class Pool:
+    """Runs ``function(*task)`` for many tasks in ``jobs`` processes."""
+
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        jobs: int,
+        *,
+        seconds: float = SECONDS,
+        memory: int = MEMORY,
+    ) -> None:
+        self._function, self._seconds, self._memory = function, seconds, memory
+        self._context = multiprocessing.get_context("spawn")
+        self._jobs = jobs
+        self._workers: list[_Worker] = []
+
+    def run(self, tasks: Iterable[tuple]) -> Iterator[tuple[tuple, Any]]:
+        """Pairs of task and result, as they are ready; :class:`Failed` for a task that failed."""
+        waiting = list(reversed(list(tasks)))
+        try:
+            self._workers = [self._start() for _ in range(min(self._jobs, len(waiting)))]
+            while waiting or any(w.task is not None for w in self._workers):
+                for worker in self._workers:
+                    if worker.task is None and waiting:
+                        self._give(worker, waiting.pop())
+                yield from self._collect()
+        finally:
+            self._stop()
+
+    def _start(self) -> _Worker:
+        ours, theirs = self._context.Pipe()
+        arguments = (theirs, self._function, self._memory)
+        process = self._context.Process(target=_serve, args=arguments, daemon=True)
+        process.start()
+        theirs.close()
+        return _Worker(process, ours)
+
+    def _give(self, worker: _Worker, task: tuple) -> None:
+        worker.task = task
+        if worker.ready:
+            worker.deadline = time.monotonic() + self._seconds
+        worker.pipe.send(task)
+
+    def _collect(self) -> Iterator[tuple[tuple, Any]]:
+        busy = [w for w in self._workers if w.task is not None]
+        left = min(w.deadline for w in busy) - time.monotonic()
+        timeout = max(0.0, min(left, self._seconds))
+        ready = wait([w.pipe for w in busy], timeout=timeout)
+        for worker in busy:
+            if worker.pipe in ready:
+                task, found = worker.task, self._received(worker)
+                if found == READY:  # its time begins now, not while it starts
+                    worker.ready, worker.deadline = True, time.monotonic() + self._seconds
+                else:
+                    yield task, found
+            elif time.monotonic() >= worker.deadline:
+                task = worker.task
+                self._replace(worker)
+                yield task, Failed("timed out")
+
+    def _received(self, worker: _Worker) -> Any:
+        try:
+            result = worker.pipe.recv()
+        except (EOFError, OSError):
+            self._replace(worker)
+            return Failed("crashed")
+        if result != READY:
+            worker.task = None
+        return result
+
+    def _replace(self, worker: _Worker) -> None:
+        worker.process.kill()
+        worker.process.join()
+        worker.pipe.close()
+        self._workers[self._workers.index(worker)] = self._start()
+
+    def _stop(self) -> None:
+        for worker in self._workers:
+            worker.process.kill()
+            worker.process.join()
+            worker.pipe.close()

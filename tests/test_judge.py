@@ -1,0 +1,347 @@
+"""Marks and messages for what students do, for every exercise that asks questions."""
+
+import re
+
+import openpyxl
+import pytest
+import students as do
+from conftest import need
+from students import ADA, SECRET, Paper
+
+from kfsheet import load_exercise
+from kfsheet.coursework.assessing import assess
+from kfsheet.coursework.handout import handout_bytes
+from kfsheet.coursework.roster import Student
+from kfsheet.excel.recalculate import convert
+from kfsheet.exercises import exercise_names
+
+FULL = {"status": "right", "remark": ""}
+
+
+@pytest.fixture(scope="module")
+def handouts():
+    """One handout of each exercise, made when it is first asked for."""
+    made = {}
+
+    def handout(name):
+        if name not in made:
+            made[name] = handout_bytes(load_exercise(name), ADA, SECRET)
+        return made[name]
+
+    return handout
+
+
+@pytest.fixture
+def football(handouts, tmp_path):
+    return Paper(load_exercise("football"), ADA, handouts("football")).open(tmp_path / "a.xlsx")
+
+
+def judged(paper):
+    """Status of the file, and marks by answer."""
+    found = assess(paper.exercise.name, SECRET, paper.save())
+    return found, {mark.name: mark for mark in found.marks}
+
+
+def one(paper, name):
+    """The mark of one answer, all others being right."""
+    found, marks = judged(paper)
+    assert found.status == "graded", found
+    others = {n: m.status for n, m in marks.items() if n != name and m.status != "right"}
+    assert others == {}, "a mistake costs its own column only"
+    return marks[name]
+
+
+SMALL = [name for name in exercise_names() if load_exercise(name).model.rows < 200]
+
+
+def asked_columns(exercise):
+    return [q.name for q in exercise.questions if q.name in exercise.model.table]
+
+
+# -- every exercise ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", exercise_names())
+def test_every_exercise_can_be_handed_out_and_its_solution_scores_full(name, handouts, tmp_path):
+    paper = Paper(load_exercise(name), ADA, handouts(name)).open(tmp_path / "a.xlsx").answer_all()
+    found, marks = judged(paper)
+    assert (found.status, found.remark, found.student) == ("graded", "", ADA.id)
+    assert {m.status for m in marks.values()} == {"right"}
+    assert sum(m.score for m in marks.values()) == sum(q.points for q in paper.exercise.questions)
+
+
+@pytest.mark.parametrize("name", exercise_names())
+def test_every_exercise_tells_mistakes_apart_in_one_file(name, handouts, tmp_path):
+    """One file, many mistakes: each costs its own answer only."""
+    paper = Paper(load_exercise(name), ADA, handouts(name)).open(tmp_path / "a.xlsx").answer_all()
+    columns = [n for n in asked_columns(paper.exercise) if do.first_relative(paper.cells(n)[-1][1])]
+    with_parameter = [n for n in columns if has_parameter(paper, n)]
+    hard = with_parameter[0]
+    columns.remove(hard)
+    sign, slip, typed, broken, *rest = columns
+    paper.answer(sign, do.negated)
+    do.absolute_slip(paper, slip)
+    do.values_pasted(paper, typed)
+    do.hard_coded(paper, hard)
+    do.broken_fill_down(paper, broken)
+    for n, answer in enumerate(rest):
+        do.helper_columns(paper, answer) if n % 2 else paper.answer(answer, do.rearranged)
+    found, marks = judged(paper)
+    told = {n: (m.status, m.score / m.points) for n, m in marks.items()}
+    assert told.pop(sign) == ("wrong", 0)
+    assert "sign is wrong" in marks[sign].remark
+    assert told.pop(slip)[0] in ("wrong", "partly right")
+    assert "refers to $" in marks[slip].remark
+    assert told.pop(typed) == ("typed", 0)
+    assert told.pop(hard) == ("hard-coded", 0.5)
+    assert do.parameter_in(paper, hard) in marks[hard].remark
+    assert told.pop(broken) == ("partly right", 0.5)
+    assert re.search(r"right in rows \d+-\d+.*row \d+ refers to \$", marks[broken].remark)
+    assert set(told.values()) == {("right", 1.0)}, told
+
+
+def has_parameter(paper, name):
+    try:
+        do.parameter_in(paper, name)
+    except StopIteration:
+        return False
+    return True
+
+
+@pytest.mark.parametrize("name", exercise_names())
+def test_an_untouched_handout_scores_nothing_and_is_called_so(name, handouts, tmp_path):
+    paper = Paper(load_exercise(name), ADA, handouts(name))
+    (tmp_path / "a.xlsx").write_bytes(handouts(name))
+    found = assess(paper.exercise.name, SECRET, tmp_path / "a.xlsx")
+    assert found.status == "untouched"
+    assert {(m.score, m.status) for m in found.marks} == {(0.0, "empty")}
+
+
+# -- right, whatever it looks like ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "formula"),
+    [
+        ("K_x", "=b_x*a/(a*a*b_x+r_i)"),
+        ("K_x", "=1/(a+r_i/(a*b_x))"),
+        ("K_x", "=POWER(r_i/(a*b_x)+a,-1)"),
+        ("K_x", "=(b_x*a)/sigma_d_i^2"),
+        ("K_z", "=-b_z*a/SUMSQ(a*SQRT(b_z),SQRT(r_j))"),
+        ("x_f", "=K{p}+dt*(E{r}-h*f*SIGN(E{r})*E{r}*E{r}*dt^(p-1))"),
+        ("x_f", "=SUM(K{p},E{r}*dt)-h*f*ABS(E{r})*E{r}*POWER(dt,p)"),
+        ("x_f", "=K{p}+SUMPRODUCT(E{r},dt)-h*f*SIGN(E{r})*E{r}^2*dt^p"),
+        ("d_i", '=IF(C{r}="","",C{r}-G{r}*a)'),
+        ("d_i", '=IF(NOT(ISNUMBER($C{r})),"",-($G{r}*Parameters!$B$8-$C{r}))'),
+        ("d_j", '=IF(COUNT(D{r})=1,D{r}-(j_0-a*H{r}),"")'),
+        ("x_a", "=G{r}+IF(ISNUMBER(C{r}),(C{r}-a*G{r})*K_x,0)"),
+        ("x_a", "=IF(ISNUMBER(I{r}),(1-K_x*a)*G{r}+K_x*C{r},G{r})"),
+        ("x_a", '=IF(I{r}<>"",G{r}+K_x*I{r},G{r})'),
+    ],
+)
+def test_an_algebraically_equal_formula_is_right(football, name, formula):
+    football.answer_all()
+    starts = len(football.model.column(name).start) if name in football.model.table else 0
+    cells = football.cells(name)
+    for cell, _ in cells[0 if name[0] in "Kd" else starts :]:
+        cell.value = formula.format(r=cell.row, p=cell.row - 1)
+    mark = one(football, name)
+    assert (mark.status, mark.score) == ("right", mark.points), mark
+
+
+def test_a_formula_split_over_several_helper_columns_and_names_is_right(football):
+    football.answer_all()
+    sheet = football.book["Reanalysis"]
+    for row in range(5, 20):
+        sheet[f"P{row}"] = f"=SIGN(E{row})*E{row}^2"
+        sheet[f"Q{row}"] = f"=h*drag*P{row}*dt^p"
+        sheet[f"G{row}"] = f"=K{row - 1}+E{row}*dt-Q{row}"
+    name = openpyxl.workbook.defined_name.DefinedName("drag", attr_text="Parameters!$B$7")
+    football.book.defined_names["drag"] = name
+    assert one(football, "x_f").status == "right"
+
+
+def test_a_renamed_and_moved_sheet_changes_no_mark(football):
+    """openpyxl renames a sheet without its references; LibreOffice below does both."""
+    football.answer_all()
+    book = football.book
+    for sheet in book:
+        for row in sheet.iter_rows():
+            for cell in row:
+                if isinstance(cell.value, str) and cell.value.startswith("="):
+                    cell.value = cell.value.replace("Reanalysis!", "'My filter'!")
+    for defined in book.defined_names.values():
+        defined.attr_text = defined.attr_text.replace("'Reanalysis'", "'My filter'")
+    book["Reanalysis"].title = "My filter"
+    book.move_sheet("My filter", 3)
+    found, marks = judged(football)
+    assert {m.status for m in marks.values()} == {"right"}
+
+
+def test_inserted_rows_and_columns_change_no_mark(football):
+    """A column before the table and two rows above it; every reference follows, as in Excel."""
+    football.answer_all()
+    sheet = football.book["Reanalysis"]
+
+    def moved(text):
+        cell = r"(?<![\w!'$.])(\$?)([A-Z]{1,2})(\$?)(\d+)(?![\w(!])"
+        return re.sub(cell, lambda m: f"{m[1]}{chr(ord(m[2]) + 1)}{m[3]}{int(m[4]) + 2}", text)
+
+    cells = {
+        (c.row, c.column): c.value for row in sheet.iter_rows() for c in row if c.value is not None
+    }
+    for row, column in cells:
+        sheet.cell(row, column).value = None
+    for (row, column), value in cells.items():
+        formula = isinstance(value, str) and value.startswith("=")
+        sheet.cell(row + 2, column + 1).value = moved(value) if formula else value
+    found, marks = judged(football)
+    assert {n: m.status for n, m in marks.items() if m.status != "right"} == {}
+
+
+def test_a_file_that_libreoffice_saved_scores_as_before(football, tmp_path):
+    need("libreoffice")
+    football.answer_all("u", "z_f")
+    football.answer("u", do.negated)
+    before, marks = judged(football)
+    saved = convert(football.path, tmp_path / "saved", "xlsx:Calc MS Excel 2007 XML")
+    after = assess("football", SECRET, saved)
+    assert (after.status, after.student) == ("graded", ADA.id)
+    assert {m.name: (m.status, m.score) for m in after.marks} == {
+        n: (m.status, m.score) for n, m in marks.items()
+    }
+
+
+# -- wrong, and in which way ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "formula", "status", "words"),
+    [
+        ("K_x", "=a*b_x/(r_i-a^2*b_x)", "wrong", "sign"),
+        ("K_x", "=b_x/(r_i+a^2*b_x)", "wrong", "factor is missing"),
+        ("K_x", "=a*b_z/(r_i+a^2*b_z)", "wrong", "value than"),
+        ("K_z", "=a*b_z/(r_j+a^2*b_z)", "wrong", "sign"),
+        ("K_x", "=a*b_x/(9+a^2*b_x)", "hard-coded", "r_i"),
+        ("x_f", "=K{p}+E{p}*dt-h*f*SIGN(E{p})*E{p}^2*dt^p", "wrong", "value than"),
+        ("x_f", "=G{p}+E{r}*dt-h*f*SIGN(E{r})*E{r}^2*dt^p", "wrong", "same unit"),
+        ("x_f", "=K{r}+E{r}*dt-h*f*SIGN(E{r})*E{r}^2*dt^p", "wrong", "wrong row"),
+        ("x_f", "=K{p}+E{r}*dt-h*f*E{r}^2*dt^p", "wrong", "sign of a velocity"),
+        ("x_f", "=K{p}+E{r}*dt", "wrong", "term is missing"),
+        ("x_f", "=K{p}+E{r}*dt-h*f*SIGN(E{r})*E{r}^2*dt", "hard-coded", " p "),
+        ("x_f", "=G{r}", "wrong", "own cell"),
+        ("x_f", "=K{r}-IF(ISNUMBER(I{r}),K_x*I{r},0)", "wrong", "value than"),
+        ("d_i", "=C{r}-a*G{r}", "gaps forgotten", "missing"),
+        ("x_f", "=K{p}+1.001*E{r}*dt-h*f*SIGN(E{r})*E{r}^2*dt^p", "rounded", "rounded"),
+        ("x_a", "=G{r}+K_x*I{r}", "gaps forgotten", "missing"),
+        ("x_a", "=IF(ISNUMBER(I{r}),G{r}+K_z*I{r},G{r})", "wrong", "same unit"),
+        ("x_a", "=IF(ISNUMBER(I{r}),G{r}-K_x*I{r},G{r})", "wrong", "sign"),
+        ("x_a", "=0*G{r}", "wrong", "value than"),
+        ("x_a", "=C{r}/a", "wrong", "value than"),
+        ("x_a", '=WEBSERVICE("http://localhost/"&G{r})', "refused", "WEBSERVICE"),
+        ("x_a", '=INDIRECT("G{r}")', "refused", "INDIRECT"),
+        ("x_a", "=cmd|'/c calc'!A1", "refused", "DDE"),
+        ("x_a", "=12.5", "typed", "number"),
+        ("x_a", "=P{r}", "wrong", "value than"),
+        ("x_a", "=#REF!+1", "wrong", "recalculated"),
+        ("x_a", "=nothing+1", "wrong", "recalculated"),
+        ("x_a", "=9^9^9^9^9*G{r}", "wrong", "recalculated"),
+    ],
+)
+def test_a_mistake_is_named_and_the_key_is_not(football, name, formula, status, words):
+    football.answer_all()
+    starts = len(football.model.column(name).start) if name in football.model.table else 0
+    for cell, _ in football.cells(name)[0 if name[0] in "Kd" else starts :]:
+        cell.value = formula.format(r=cell.row, p=cell.row - 1)
+    mark = one(football, name)
+    allowed = {status, "partly right"} if name == "x_a" else {status}
+    assert mark.status in allowed, mark
+    assert words in mark.remark
+    assert mark.score < mark.points
+    key = football.cells(name)[-1][1][1:]
+    assert key not in mark.remark
+
+
+def test_a_swapped_atan2_is_named(handouts, tmp_path):
+    paper = Paper(load_exercise("cannonball"), ADA, handouts("cannonball"))
+    paper.open(tmp_path / "a.xlsx").answer_all()
+
+    def swapped(text, _):
+        return re.sub(r"ATAN2\(([^,()]+),([^,()]+)\)", r"ATAN2(\2,\1)", text)
+
+    paper.answer("d_theta", swapped)
+    mark = one(paper, "d_theta")
+    assert (mark.status, mark.score) == ("wrong", 0)
+    assert "ATAN2" in mark.remark
+
+
+def test_a_gap_in_the_rows_is_located(football):
+    football.answer_all()
+    football.book["Reanalysis"]["G12"] = None
+    football.book["Reanalysis"]["G13"] = None
+    mark = one(football, "x_f")
+    assert (mark.status, mark.score) == ("partly right", 1)
+    assert mark.remark == "right in rows 4-11, 14-19; not in rows 12-13: empty"
+
+
+def test_what_cannot_be_parsed_is_judged_by_recalculation(football):
+    """IFERROR is no mathematics, but an engine can tell whether it is right."""
+    football.answer_all()
+    football.answer("u", lambda text, _: f"=IFERROR({text[1:]},0)")
+    football.answer("w", lambda text, _: f"=IFERROR(-({text[1:]}),0)")
+    found, marks = judged(football)
+    assert (marks["u"].status, marks["u"].score) == ("right", 2)
+    assert (marks["w"].status, marks["w"].score) == ("wrong", 0)
+    assert "recalculated" in marks["w"].remark
+
+
+def test_stored_values_are_never_believed(football, tmp_path):
+    """A file whose formulas are wrong and whose stored values are right."""
+    football.answer_all()
+    football.answer("x_a", lambda *_: "=1+1")
+    path = football.save()
+    import zipfile
+
+    with zipfile.ZipFile(path) as old, zipfile.ZipFile(tmp_path / "b.xlsx", "w") as new:
+        for name in old.namelist():
+            text = old.read(name)
+            new.writestr(
+                name,
+                text.replace(b"<f>1+1</f><v></v>", b"<f>1+1</f><v>23.4</v>").replace(
+                    b"<f>1+1</f><v />", b"<f>1+1</f><v>23.4</v>"
+                ),
+            )
+    found = assess("football", SECRET, tmp_path / "b.xlsx")
+    marks = {m.name: m for m in found.marks}
+    assert (marks["x_a"].status, marks["x_a"].score) == ("typed", 0)
+
+
+def test_locked_cells_that_were_edited_are_named_and_change_no_mark(football):
+    football.answer_all()
+    football.book["Parameters"]["B5"] = 0.2
+    football.book["Reanalysis"]["C6"] = 800
+    football.book["Errors"]["C9"] = "=A1"
+    found, marks = judged(football)
+    assert {m.status for m in marks.values()} == {"right"}
+    for name in ("dt", "i", "locked cells were changed"):
+        assert name in found.remark
+
+
+def test_a_cell_that_reads_its_own_consequences_goes_in_a_circle(football):
+    """x_f from x_a, which follows from x_f: an identity, but no answer."""
+    football.answer_all()
+    for cell, _ in football.cells("x_f")[1:]:
+        cell.value = f"=K{cell.row}-N(0)-IF(ISNUMBER(I{cell.row}),K_x*I{cell.row},0)"
+    mark = one(football, "x_f")
+    assert mark.score < mark.points
+
+
+def test_another_students_numbers_typed_in_are_not_taken_for_hard_coded(handouts, tmp_path):
+    paper = Paper(load_exercise("football"), ADA, handouts("football")).open(tmp_path / "a.xlsx")
+    other = Paper(load_exercise("football"), Student("s002", "Bob"))
+    paper.answer_all()
+    value = dict(other.own.parameters)["a"]
+    assert value != dict(paper.own.parameters)["a"]
+    paper.answer("K_x", lambda *_: f"={value}*b_x/(r_i+{value}^2*b_x)")
+    mark = one(paper, "K_x")
+    assert (mark.status, mark.score) == ("wrong", 0)
