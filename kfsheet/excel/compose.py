@@ -25,6 +25,7 @@ from kfsheet.recurrence import Recurrence
 from kfsheet.units import pretty_unit
 
 NOT_AVAILABLE = "#N/A"
+TITLE_HEIGHT = 26
 
 
 class Piece(NamedTuple):
@@ -53,6 +54,8 @@ class Page:
 
     def put(self, row: int, column: int, content: Any, kind: str = "text", **more: Any) -> None:
         """Place one cell."""
+        if kind == "title":
+            self.heights[row] = TITLE_HEIGHT
         self.pieces[row, column] = Piece(content, kind, **more)
 
 

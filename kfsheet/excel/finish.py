@@ -13,7 +13,8 @@ import zlib
 from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
-from xml.sax.saxutils import escape
+
+from kfsheet.excel.cells import typed
 
 EPOCH = (1980, 1, 1, 0, 0, 0)
 FORMULA = re.compile(r'<c r="([A-Z]+\d+)"([^>]*)><f>(.*?)</f><v ?/?>(?:</v>)?</c>', re.DOTALL)
@@ -21,6 +22,8 @@ NUMBER = re.compile(r'(<c r="([A-Z]+\d+)"[^>]*><v>)([^<]*)</v>')
 # An empty cell that is typed as a number is read as 0 by some programs.
 EMPTY = re.compile(r'(<c r="[A-Z]+\d+"(?: s="\d+")?) t="n"(?: ?/>|></c>)')
 MOMENT = re.compile(r"(<dcterms:(created|modified)[^>]*>)[^<]*(</dcterms:\2>)")
+SHEET_DATA = re.compile(r"<sheetData ?/>|<sheetData>.*?</sheetData>", re.DOTALL)
+DIMENSION = re.compile(r"<dimension [^>]*/>")
 # Every program that saves a workbook writes its own name here.
 PROGRAM = re.compile(rb"(<Application>)[^<]*(</Application>)")
 BY_US = b"kfsheet"
@@ -28,17 +31,33 @@ BY_US = b"kfsheet"
 Value = float | int | str | bool | None
 
 
-def finish(saved: bytes, values: Mapping[str, Mapping[str, Value]]) -> bytes:
-    """A saved workbook with ``values[part][cell]`` stored in its formula cells, and in numbers.
+def finish(
+    saved: bytes,
+    values: Mapping[str, Mapping[str, Value]] | None = None,
+    *,
+    sheets: Mapping[str, str] | None = None,
+) -> bytes:
+    """A saved workbook without moments of time, and with what openpyxl does not write.
 
-    ``part`` is the name inside the zip, ``xl/worksheets/sheet1.xml``.
+    Parameters
+    ----------
+    saved : bytes
+        What openpyxl saved.
+    values : mapping, optional
+        ``values[part][cell]`` is stored in formula cells, and in numbers; ``part`` is the name
+        inside the zip, ``xl/worksheets/sheet1.xml``.
+    sheets : mapping, optional
+        ``sheets[part]`` is the element ``sheetData`` that replaces openpyxl's.
     """
+    values, sheets = values or {}, sheets or {}
     result = BytesIO()
     with zipfile.ZipFile(BytesIO(saved)) as old, zipfile.ZipFile(result, "w") as new:
         for name in sorted(old.namelist()):
             content = old.read(name)
             if name in values:
                 content = _with_values(content.decode(), values[name]).encode()
+            elif name in sheets:
+                content = _with_cells(content.decode(), sheets[name]).encode()
             elif name == "docProps/core.xml":
                 content = MOMENT.sub(r"\g<1>2000-01-01T00:00:00Z\3", content.decode()).encode()
             elif name == "docProps/app.xml":
@@ -49,10 +68,15 @@ def finish(saved: bytes, values: Mapping[str, Mapping[str, Value]]) -> bytes:
     return result.getvalue()
 
 
+def _with_cells(xml: str, cells: str) -> str:
+    """Cells in the place of openpyxl's, and no claim about how far they reach."""
+    return SHEET_DATA.sub(lambda _: cells, DIMENSION.sub("", xml), count=1)
+
+
 def _with_values(xml: str, values: Mapping[str, Value]) -> str:
     def cell(match: re.Match) -> str:
         address, attributes, formula = match.groups()
-        kind, text = _typed(values[address])
+        kind, text = typed(values[address])
         return f'<c r="{address}"{attributes}{kind}><f>{formula}</f><v>{text}</v></c>'
 
     def number(match: re.Match) -> str:
@@ -60,15 +84,6 @@ def _with_values(xml: str, values: Mapping[str, Value]) -> str:
         return f"{head}{values.get(address, text)!s}</v>"
 
     return EMPTY.sub(r"\1 />", FORMULA.sub(cell, NUMBER.sub(number, xml)))
-
-
-def _typed(value: Value) -> tuple[str, str]:
-    """Type attribute and text of a stored value."""
-    if isinstance(value, bool):
-        return ' t="b"', str(int(value))
-    if isinstance(value, str):
-        return (' t="e"' if value.startswith("#") else ' t="str"'), escape(value)
-    return "", repr(value)
 
 
 def untouched(path: Path) -> bool:

@@ -15,6 +15,7 @@ from openpyxl.worksheet.datavalidation import DataValidation
 from openpyxl.worksheet.worksheet import Worksheet
 
 from kfsheet.errors import WorkbookError
+from kfsheet.excel.cells import sheet_data
 from kfsheet.excel.checkpage import FAIL, PASS, check_page
 from kfsheet.excel.compose import (
     Page,
@@ -31,7 +32,6 @@ from kfsheet.excel.styles import Styles
 from kfsheet.exercise import Exercise
 from kfsheet.files import write_file
 
-TITLE_HEIGHT = 26
 TABS = {"Read me": "1F3864", "Parameters": "FFC000", "Charts": "0072B2", "Check": "70AD47"}
 
 
@@ -57,19 +57,32 @@ def workbook_bytes(exercise: Exercise) -> bytes:
 def built_bytes(exercise: Exercise, layout: Layout, now: Run) -> bytes:
     """The workbook of an exercise for a run with other parameters and data."""
     pages = compose(exercise, layout, now, now)
-    book = assemble(exercise, layout, pages, now)
+    book = assemble(exercise, layout, pages, now, cells=False)
+    styles = Styles(book)
+    sheets = {part(n): sheet_data(page, styles.number) for n, page in enumerate(pages, 1)}
+    styles.close()
     saved = BytesIO()
     book.save(saved)
-    return finish(saved.getvalue(), _stored_values(pages))
+    return finish(saved.getvalue(), sheets=sheets)
 
 
-def assemble(exercise: Exercise, layout: Layout, pages: list[Page], now: Run) -> Workbook:
-    """Pages as a workbook of openpyxl, with names, validations and charts."""
+def part(number: int) -> str:
+    """Name inside the zip of a worksheet; openpyxl numbers them in order."""
+    return f"xl/worksheets/sheet{number}.xml"
+
+
+def assemble(
+    exercise: Exercise, layout: Layout, pages: list[Page], now: Run, *, cells: bool = True
+) -> Workbook:
+    """Pages as a workbook of openpyxl, with names, validations and charts; if asked, with cells."""
     book = Workbook()
     book.remove(book.active)
     styles = Styles(book)
     for page in pages:
-        _write_page(book, styles, page)
+        sheet = book.create_sheet(page.title)
+        if cells:
+            _fill(sheet, styles, page)
+        _dress(sheet, page)
     styles.close()
     _define_names(book, layout, pages)
     _add_validations(book["Parameters"], layout, now)
@@ -117,8 +130,7 @@ def write_workbook(exercise: Exercise, path: str | Path, *, force: bool = False)
     return write_file(target, workbook_bytes(exercise))
 
 
-def _write_page(book: Workbook, styles: Styles, page: Page) -> None:
-    sheet = book.create_sheet(page.title)
+def _fill(sheet: Worksheet, styles: Styles, page: Page) -> None:
     height = max(row for row, _ in page.pieces)
     width = max(column for _, column in page.pieces)
     for row in range(1, height + 1):
@@ -126,17 +138,19 @@ def _write_page(book: Workbook, styles: Styles, page: Page) -> None:
         sheet.append(
             [p and styles.cell(sheet, p.content, p.kind, p.format, p.align) for p in cells]
         )
+
+
+def _dress(sheet: Worksheet, page: Page) -> None:
+    """Widths, heights, what is frozen, and how it prints."""
     for column, size in page.widths.items():
         sheet.column_dimensions[get_column_letter(column)].width = size
     for row, size in page.heights.items():
         sheet.row_dimensions[row].height = size
-    if page.pieces[1, 1].kind == "title":
-        sheet.row_dimensions[1].height = TITLE_HEIGHT
     for cells in page.merges:
         sheet.merge_cells(cells)
     sheet.freeze_panes = page.freeze or None
     sheet.sheet_properties.tabColor = TABS.get(page.title, "A6A6A6")
-    sheet.sheet_view.showGridLines = page.title in book.sheetnames and bool(page.freeze)
+    sheet.sheet_view.showGridLines = bool(page.freeze)
     sheet.page_setup.orientation, sheet.page_setup.fitToHeight = "landscape", 0
     sheet.sheet_properties.pageSetUpPr.fitToPage = True
     if page.freeze:
@@ -201,7 +215,7 @@ def _stored_values(pages: list[Page]) -> dict[str, dict[str, Value]]:
     openpyxl numbers sheets in order, and writes 16 digits.
     """
     return {
-        f"xl/worksheets/sheet{n}.xml": {
+        part(n): {
             f"{get_column_letter(column)}{row}": (
                 piece.stored if is_formula(piece.content) else piece.content
             )
