@@ -399,9 +399,9 @@ kf.draw(CHARTS["Innovations of u1"], run, axes[0])
 _ = kf.draw(CHARTS["Innovations of v1"], run, axes[1])
 
 # %% [markdown]
-# Nineteen of twenty innovations stay in their band. How near does the filter come to the optimum, a least squares
-# fit of all pixels that knows drag and spin as well? Without noise of the model, flying the last
-# analysis backwards gives the smoothed path. Twenty draws:
+# Nineteen of twenty innovations lie in their band. How near does the filter come to the optimum, a
+# least squares fit of all pixels that knows drag and spin as well? Without noise of the model,
+# flying the last analysis backwards gives the smoothed path. Twenty draws:
 
 
 # %%
