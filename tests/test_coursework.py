@@ -134,7 +134,8 @@ def test_answers_are_empty_open_and_the_rest_is_locked(handout):
                     assert (cell.value, cell.protection.locked) == (None, False)
                 elif cell.value is not None:
                     assert cell.protection.locked, (sheet.title, cell.coordinate)
-    assert not book["Reanalysis"].column_dimensions["Q"].protection.locked
+    rest = book["Reanalysis"].column_dimensions["M"]  # the first column beside the table
+    assert (rest.min, rest.max, rest.protection.locked) == (13, 16_384, False)
     assert "Check" not in book.sheetnames
 
 

@@ -64,9 +64,7 @@ def asked_columns(exercise):
 
 
 @pytest.mark.parametrize("name", SMALL)
-def test_every_short_exercise_can_be_handed_out_and_its_solution_scores_full(
-    name, handouts, tmp_path
-):
+def test_the_solution_of_every_short_exercise_scores_full(name, handouts, tmp_path):
     paper = Paper(load_exercise(name), ADA, handouts(name)).open(tmp_path / "a.xlsx").answer_all()
     found, marks = judged(paper)
     assert (found.status, found.remark, found.student) == ("graded", "", ADA.id)
