@@ -84,7 +84,7 @@ def evaluate(
     --------
     >>> from kfsheet.exercises.football import football
     >>> evaluate(football, h=0, p=2)["z_a"].round(2).head(3).tolist()
-    [0.11, 1.11, 2.0]
+    [0.11, 1.12, 1.83]
     """
     if members is not None:
         from kfsheet.members import study

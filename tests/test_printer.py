@@ -216,4 +216,4 @@ def test_2500_random_expressions_are_worth_the_same_in_python(drawn):
 
 def test_an_observed_cell_is_asked_for_and_never_assumed():
     assert Observed(Missing) == False  # noqa: E712 - SymPy's false
-    assert python_code(when_observed(u[t], u[t], 0)) == "u[t] if observed(u[t]) else 0"
+    assert python_code(when_observed(u[t], u[t], 0)) == "u[t] if observed(u[t]) else 0.0"

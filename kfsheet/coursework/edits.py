@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 from math import isclose, isnan
 
 from openpyxl.utils import get_column_letter
 
 from kfsheet.coursework.judge import asked_steps
-from kfsheet.coursework.meaning import Interpreter
+from kfsheet.coursework.meaning import Interpreter, Meaning
 from kfsheet.coursework.places import Places
 from kfsheet.coursework.submission import Book, Content, Formula
 from kfsheet.coursework.worlds import Own
@@ -55,14 +56,15 @@ def _data(exercise: Exercise, book: Book, places: Places, own: Own) -> Iterator[
 
 def _formulas(exercise: Exercise, book: Book, places: Places) -> Iterator[str]:
     asked = {q.name for q in exercise.questions}
-    interpreter, (given, original) = Interpreter(book, places), _original(exercise)
+    interpreter = Interpreter(book, places)
+    _original(exercise)
     for column in exercise.model.table.values():
         if column.is_data or column.name in asked:
             continue
         steps = asked_steps(exercise.model, column.name)
         for step in steps[:: max(1, len(steps) // SAMPLE)]:
             found = places.address(column.name, step)
-            wanted = given.meaning(original.address(column.name, step), step)
+            wanted = _given(exercise.name, column.name, step)
             try:
                 same = found and interpreter.meaning(found, step) == wanted
             except FormulaError:
@@ -70,6 +72,13 @@ def _formulas(exercise: Exercise, book: Book, places: Places) -> Iterator[str]:
             if not same:
                 yield column.name
                 break
+
+
+@lru_cache(maxsize=50_000)
+def _given(exercise: str, column: str, step: int) -> Meaning | None:
+    """What a cell meant when it was handed out."""
+    interpreter, places = _originals[exercise]
+    return interpreter.meaning(places.address(column, step), step)
 
 
 _originals: dict[str, tuple[Interpreter, Places]] = {}

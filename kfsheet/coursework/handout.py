@@ -120,11 +120,16 @@ def handout_pages(exercise: Exercise, layout: Layout, now: Run) -> list[Page]:
         for step in asked_steps(exercise.model, question.name):
             _empty(by_title[sheet], (FIRST_ROW + step, column))
     _mend_read_me(by_title["Read me"])
+    _mend_parameters(by_title["Parameters"])
     return pages
 
 
 def _empty(page: Page, place: tuple[int, int]) -> None:
     page.pieces[place] = Piece(None, "answer", format=page.pieces[place].format)
+
+
+def _mend_parameters(page: Page) -> None:
+    page.put(2, 1, "These are your own numbers; everything follows from them.")
 
 
 def _mend_read_me(page: Page) -> None:
@@ -147,6 +152,8 @@ def _finish_book(book: Workbook, exercise: Exercise, layout: Layout, token: str)
     hide(book)
     for sheet in book.worksheets:
         _protect(sheet)
+    for row in book["Read me"].iter_rows(max_col=1):
+        row[0].protection = Protection(locked=True)  # the legend looks like an answer, and is none
     book.active = book.sheetnames.index(SHEET)
 
 

@@ -89,6 +89,7 @@ class Judge:
         self.places = Places.find(book, exercise.model)
         self._interpreter = Interpreter(book, self.places)
         self._exercise = exercise
+        self._starts: dict[str, int] = {}
         self._verdicts: dict[tuple, tuple[str, str]] = {}
 
     def marks(self) -> list[Mark]:
@@ -130,9 +131,10 @@ class Judge:
 
     def _rule(self, name: str, step: int) -> int:
         """Number of the rule that holds in a step: a start value, or the general one."""
-        if name in self._model.derived_scalars:
-            return 0
-        return min(step, len(self._model.column(name).start))
+        if name not in self._starts:
+            scalar = name in self._model.derived_scalars
+            self._starts[name] = 0 if scalar else len(self._model.column(name).start)
+        return min(step, self._starts[name])
 
     def _judged(self, name: str, cell: Cell) -> tuple[str, str]:
         if cell.expression.has(Aggregate):

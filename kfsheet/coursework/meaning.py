@@ -52,6 +52,7 @@ class Interpreter:
         self._book, self._places, self.model = book, places, places.model
         self._open: list[Address] = []
         self._sizes: dict[Slot, int] = {}
+        self._scalars: dict[str, Slot] = {}  # names that stand for one, whatever the row
 
     def meaning(self, address: Address, step: int) -> Meaning | None:
         """What the formula in a cell means in row ``step``; None if it holds no formula.
@@ -97,7 +98,10 @@ class Interpreter:
 
     def _slot(self, reference: Reference, host: Address, step: int) -> Slot:
         if reference.name:
-            return self._named(reference, host, step)
+            slot = self._scalars.get(reference.name) or self._named(reference, host, step)
+            if slot[0] == "scalar":
+                self._scalars[reference.name] = slot
+            return slot
         sheet = find_sheet(self._book, reference.sheet or host[0])
         if sheet not in self._book.sheets:
             raise FormulaError(f"there is no worksheet {reference.sheet}")

@@ -261,8 +261,10 @@ class _SheetReader:
         raise SubmissionError("refused", "its XML declares a document type")
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
-        tag = tag.rpartition(":")[2]
-        if tag == "row":
+        tag = tag.rpartition(":")[2] if ":" in tag else tag
+        if tag == "v" or tag == "t":
+            self._words, self._listening = [], True
+        elif tag == "row":
             row = int(attributes["r"]) if "r" in attributes else self._at[0] + 1
             self._at = (row, 0)
         elif tag == "c":
@@ -272,8 +274,6 @@ class _SheetReader:
             self._formula, self._value = None, ""
         elif tag == "f":
             self._attributes, self._words, self._listening = attributes, [], True
-        elif tag in ("v", "t"):
-            self._words, self._listening = [], True
 
     def _place(self, text: str | None) -> Cell:
         if text is None:
@@ -289,7 +289,7 @@ class _SheetReader:
             self._words.append(words)
 
     def _end(self, tag: str) -> None:
-        tag = tag.rpartition(":")[2]
+        tag = tag.rpartition(":")[2] if ":" in tag else tag
         if tag == "f":
             self._formula, self._listening = self._read_formula("".join(self._words)), False
         elif tag in ("v", "t") and self._listening:
