@@ -294,8 +294,9 @@ from kfsheet.exercises.cannonball import cannonball
 evaluate(cannonball, Draws("n_theta", "n_r"), members={members}, columns=["NIS", "e_x_a"],
          nees={{"NEES": NEES(("x", "vx", "y", "vy"))}}, quantiles=(0.5,))
 status = Path("/proc/self/status")  # unlike getrusage, it knows nothing of the parent
-peak = [line for line in status.read_text().splitlines() if "VmHWM" in line] if status.exists() else []
-print((int(peak[0].split()[1]) if peak else resource.getrusage(resource.RUSAGE_SELF).ru_maxrss) / 1024)
+lines = status.read_text().splitlines() if status.exists() else []
+peak = [int(line.split()[1]) for line in lines if "VmHWM" in line]
+print((peak or [resource.getrusage(resource.RUSAGE_SELF).ru_maxrss])[0] / 1024)
 """
 
 
