@@ -52,6 +52,8 @@ class Exercise:
         Parameters that differ from student to student: lowest and highest value by name.
     noise : tuple of str
         Data columns that hold standard-normal draws; every student gets other ones.
+    frozen : tuple of str
+        Worksheets whose formulas would give answers away; handouts hold their values only.
     draw : function of (generator, parameters), optional
         Draws other data columns anew, as lists by name; None in a list is a missing value.
 
@@ -71,6 +73,7 @@ class Exercise:
     greyed: str = ""
     vary: dict[str, tuple[float, float]] = field(default_factory=dict)
     noise: tuple[str, ...] = ()
+    frozen: tuple[str, ...] = ()
     draw: Draw | None = None
 
     def __post_init__(self) -> None:
@@ -88,7 +91,7 @@ class Exercise:
             self._check_question(question)
         if self.greyed:
             self.model.column(self.greyed)
-        if unknown := set(self.sections) - set(self.model.sections):
+        if unknown := {*self.sections, *self.frozen} - set(self.model.sections):
             raise ModelError(f"{self.name} has no section {unknown.pop()!r}")
         self._check_variation()
 

@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 
     from kfsheet.recurrence import Recurrence
 
-GROUP = 16  # members a task, so that its rows fit into the cache of a core
+NUMBERS = 2**17  # of a group: as many as fit into the cache of a core
+FEWEST, MOST = 16, 2048  # members of a group
 STATISTICS = ("mean", "rms", "std", "count")
 
 
@@ -352,8 +353,10 @@ def _bar(members: int) -> Any:
 def _groups(task: _Task, members: int) -> Iterator[_Task]:
     from dataclasses import replace
 
-    for first in range(0, members, GROUP):
-        last = min(first + GROUP, members)
+    size = NUMBERS // (task.rows * max(1, len(task.kernel.columns)))
+    size = min(max(size, FEWEST), MOST)
+    for first in range(0, members, size):
+        last = min(first + size, members)
 
         def part(array: np.ndarray, first: int = first, last: int = last) -> np.ndarray:
             return array if len(array) == 1 else array[first:last]

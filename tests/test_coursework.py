@@ -139,6 +139,14 @@ def test_answers_are_empty_open_and_the_rest_is_locked(handout):
     assert "Check" not in book.sheetnames
 
 
+def test_a_sheet_whose_formulas_are_answers_holds_numbers_only(handout):
+    """The free run steps the same model: its formulas would give u, w, x_f, z_f away."""
+    sheet = openpyxl.load_workbook(handout)["Free run"]
+    values = [cell.value for row in sheet.iter_rows(min_row=4) for cell in row if cell.value]
+    assert len(values) > 60
+    assert not any(isinstance(value, str) for value in values)
+
+
 def test_feedback_is_live_and_gives_no_number_away(handout, engine, tmp_path):
     """The words turn from "not yet" to "looks right", answer by answer."""
     paper = Paper(FOOTBALL, handout=handout.read_bytes()).open(tmp_path / "a.xlsx")

@@ -174,7 +174,13 @@ def test_a_cache_that_cannot_be_written_does_not_stop_anybody(monkeypatch, tmp_p
 
 # -- many members ----------------------------------------------------------------------------
 
-MANY = 50  # more than three groups
+MANY = 50
+
+
+@pytest.fixture(autouse=True)
+def small_groups(monkeypatch):
+    """So that a few members make several groups."""
+    monkeypatch.setattr("kfsheet.members.MOST", 16)
 
 
 def flights(count=MANY, **options):

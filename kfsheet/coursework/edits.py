@@ -59,7 +59,7 @@ def _formulas(exercise: Exercise, book: Book, places: Places) -> Iterator[str]:
     interpreter = Interpreter(book, places)
     _original(exercise)
     for column in exercise.model.table.values():
-        if column.is_data or column.name in asked:
+        if column.is_data or column.name in asked or column.section in exercise.frozen:
             continue
         steps = asked_steps(exercise.model, column.name)
         for step in steps[:: max(1, len(steps) // SAMPLE)]:

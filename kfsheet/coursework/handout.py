@@ -119,6 +119,8 @@ def handout_pages(exercise: Exercise, layout: Layout, now: Run) -> list[Page]:
         by_title[sheet].heights[3] = 90
         for step in asked_steps(exercise.model, question.name):
             _empty(by_title[sheet], (FIRST_ROW + step, column))
+    for section in exercise.frozen:
+        _freeze(by_title[section])
     _mend_read_me(by_title["Read me"])
     _mend_parameters(by_title["Parameters"])
     return pages
@@ -126,6 +128,13 @@ def handout_pages(exercise: Exercise, layout: Layout, now: Run) -> list[Page]:
 
 def _empty(page: Page, place: tuple[int, int]) -> None:
     page.pieces[place] = Piece(None, "answer", format=page.pieces[place].format)
+
+
+def _freeze(page: Page) -> None:
+    """Numbers in the place of formulas that are those of an answer."""
+    for place, piece in page.pieces.items():
+        if is_formula(piece.content):
+            page.pieces[place] = piece._replace(content=piece.stored, kind="data", stored=None)
 
 
 def _mend_parameters(page: Page) -> None:

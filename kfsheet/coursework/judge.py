@@ -71,11 +71,15 @@ Recalculated = Callable[[str], dict[int, bool]]
 
 
 def asked_steps(model: Recurrence, name: str) -> list[int]:
-    """Steps in which an answer is asked for; a derived scalar has the one step 0."""
+    """Steps in which an answer is asked for; a derived scalar has the one step 0.
+
+    A start that is a plain number is given: there is no formula to find.
+    """
     if name in model.derived_scalars:
         return [0]
     column = model.column(name)
-    return [k for k in range(model.rows) if column.definition(k) is not Missing]
+    given = [rule is Missing or rule.is_Number for rule in column.start]
+    return [k for k in range(model.rows) if not (k < len(given) and given[k])]
 
 
 class Judge:

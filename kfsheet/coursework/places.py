@@ -74,14 +74,15 @@ class Places:
 
 def _find_table(book: Book, model: Recurrence, section: str) -> Table | None:
     wanted = {column.name for column in model.sections[section]}
-    keys = {model.step, *(["time"] if model.clock else []), *wanted}
+    step = model.step_of(section)
+    keys = {step, *(clock.name for clock in model.clock_of(section)), *wanted}
     anchor = next(iter(wanted))
     for sheet, cells in book.sheets.items():
         for (row, _), content in cells.items():
             if content == anchor and (header := _header(cells, row)).keys() >= keys:
                 columns = {header[name]: name for name in keys}
-                columns[header[model.step]] = "t"
-                steps = _steps(cells, header[model.step], row, model.rows)
+                columns[header[step]] = "t"
+                steps = _steps(cells, header[step], row, model.rows)
                 return Table(sheet, columns, steps, {k: r for r, k in steps.items()}, row)
     return None
 

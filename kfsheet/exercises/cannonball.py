@@ -316,4 +316,5 @@ exercise = Exercise(
         "sigma_r": (20, 40),
     },
     noise=("n_theta", "n_r"),
+    frozen=("Linear",),
 )

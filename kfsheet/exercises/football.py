@@ -397,5 +397,6 @@ exercise = Exercise(
         "b_x": (0.006, 0.02),
         "b_z": (0.006, 0.02),
     },
+    frozen=("Free run",),
     draw=draw_kick,
 )

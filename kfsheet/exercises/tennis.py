@@ -6,7 +6,10 @@ takes every pixel by itself, so that an image of one camera alone is worth what 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from math import isnan
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sympy import Expr, Piecewise, S, Symbol, diag, floor, sqrt, zeros
 
@@ -29,8 +32,11 @@ from kfsheet.recurrence import Recurrence
 from kfsheet.tennis.cameras import FOCAL_LENGTH, PIXELS
 from kfsheet.tennis.dynamics import GRAVITY
 from kfsheet.tennis.sheets import add_cameras, add_centroid
-from kfsheet.tennis.shots import DRIVE, SIGMA, TOSS, Scene, Shot, read_shot
+from kfsheet.tennis.shots import DRIVE, SIGMA, TOSS, Scene, Shot, read_shot, simulate
 from kfsheet.tennis.track import AXES, add_flight, add_triangulation, length, push
+
+if TYPE_CHECKING:
+    from numpy.random import RandomState
 
 DATA = Path(__file__).parent / "data"
 PHOTOS = {
@@ -314,8 +320,21 @@ QUESTIONS = (
 )
 
 
-def exercise_of(model: Recurrence) -> Exercise:
+def exercise_of(model: Recurrence, shot: Shot) -> Exercise:
     """The exercise of a shot: the same words, charts and questions."""
+
+    def photographed_again(dice: RandomState, p: Mapping[str, float]) -> dict[str, list]:
+        """The same flight, photographed with other errors."""
+        again = simulate(shot, dice.randint(2**31), p["sigma_px"])
+        pixels = {
+            name: (again.pixels_1, again.pixels_2)[camera - 1][:, way]
+            for name, (_, camera, way) in PHOTOS.items()
+        }
+        return {
+            name: [None if isnan(v) else round(v, 3) for v in values.tolist()]
+            for name, values in pixels.items()
+        }
+
     return Exercise(
         model=model,
         about=ABOUT,
@@ -324,7 +343,9 @@ def exercise_of(model: Recurrence) -> Exercise:
         questions=QUESTIONS,
         notebook="notebooks/04_tennis.ipynb",
         sections=SECTIONS,
+        vary={"sigma_px": (0.15, 0.3), "s_x": (0.08, 0.15), "s_v": (0.8, 1.5)},
+        draw=photographed_again,
     )
 
 
-exercise = exercise_of(tennis)
+exercise = exercise_of(tennis, read_drive())

@@ -2,5 +2,6 @@
 
 from kfsheet.exercises.tennis import build_model, exercise_of, read_toss
 
-tennis_toss = build_model(read_toss(), name="tennis_toss")
-exercise = exercise_of(tennis_toss)
+shot = read_toss()
+tennis_toss = build_model(shot, name="tennis_toss")
+exercise = exercise_of(tennis_toss, shot)
