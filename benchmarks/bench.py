@@ -254,6 +254,47 @@ def many_runs() -> Iterator[Line]:
         "1",
     )
 
+    if find_spec("simdkalman"):
+        yield shuttlecocks()
+
+
+def shuttlecocks() -> Line:
+    """The filter of one axis of the shuttlecock, beside simdkalman, which is given its input."""
+    import simdkalman
+
+    from kfsheet.exercises.shuttlecock import joint_model, shuttlecock
+
+    draws = np.random.RandomState(3).standard_normal((MEMBERS, shuttlecock.rows))
+    wanted = ["x_a", "vx_a", "ax_a"]
+
+    def ours() -> object:
+        return kf.evaluate(shuttlecock, {"n_x": draws}, members=MEMBERS, columns=wanted, scalars=())
+
+    run = kf.evaluate(shuttlecock)
+    values = {**run.attrs["parameters"], **run.attrs["scalars"]}
+    model = joint_model(shuttlecock, "x")
+    A, Q = (
+        np.array(matrix.subs({s: values[s.name] for s in matrix.free_symbols}), dtype=float)
+        for matrix in (model.F, model.Q)
+    )
+    noise = (run["x_obs"] - run["x_true"])[1] / run["n_x"][1]
+    seen = run["x_true"].to_numpy() + noise * draws
+    start = np.zeros((MEMBERS, 3, 1))
+    start[:, 0, 0] = seen[:, 0]
+    P = A @ np.diag([values["r_obs"], values["var_v"], values["var_a"]]) @ A.T + Q
+    peer = simdkalman.KalmanFilter(A, Q, np.array([[1, 0, 0]]), np.array([[values["r_obs"]]]))
+
+    def theirs() -> np.ndarray:
+        found = peer.compute(
+            seen[:, 1:], 0, A @ start, P, smoothed=False, filtered=True, observations=False
+        )
+        return found.filtered.states.mean.mean(axis=0)
+
+    study = ours()
+    means = np.column_stack([study.rows[name]["mean"][1:] for name in wanted])
+    assert np.allclose(means, theirs(), rtol=1e-9, atol=1e-9)
+    return "10,000 shuttlecocks, one axis: simdkalman", seconds(ours), seconds(theirs), "1"
+
 
 def vectorised_football(i: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The football filter, all members at once, row after row."""
@@ -365,7 +406,7 @@ def nine_states() -> None:
     names = [Symbol(f"s{k}_", real=True) for k in range(9)]
     state = {s: kf.State("", f"element {k}", 0, 1) for k, s in enumerate(names)}
     x = Matrix(names)
-    A = eye(9) + a * Matrix(9, 9, lambda i, j: int(abs(i - j) <= 1))
+    A = eye(9) + a * Matrix(9, 9, lambda i, j: 1 if abs(int(i) - int(j)) < 2 else 0)
     seen = [
         kf.Observation(
             f"y{k}", m.data(f"y_{k}", [0, 0, 0], "", "seen", section="D")[kf.t], s, 1, ""
