@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from mpmath import mpf
-from sympy import Basic, Expr, Indexed, Symbol
+from sympy import Basic, Dummy, Expr, Indexed, Symbol
 
 from kfsheet.coursework.arithmetic import MISSING
 from kfsheet.coursework.comparing import ERROR, worth
@@ -114,11 +114,12 @@ def _with_arguments(key: Expr) -> tuple[Expr, dict[Basic, str]]:
     """The key as a function: cells become arguments, ``x_a[t - 1]`` is ``x_a_before``."""
     names: dict[Basic, str] = {}
     cells = sorted(key.atoms(Indexed), key=lambda c: (str(c.base.label), int(lag(c))))
-    scalars = {s for s in key.free_symbols if isinstance(s, Symbol)}
-    inside = {s for c in cells for s in (c.base.label, *c.indices[0].free_symbols)}
     for cell in cells:
         names[cell] = str(cell.base.label) + ("", "_before", "_before2")[int(lag(cell))]
-    for symbol in sorted((scalars - inside) | (key.free_symbols & {t} - inside), key=str):
+    # The row t may stand in the index of a cell, in the formula itself, or in both.
+    stand_ins = {cell: Dummy(real=True) for cell in cells}
+    beside = key.xreplace(stand_ins).free_symbols - set(stand_ins.values())
+    for symbol in sorted(beside, key=str):
         names[symbol] = symbol.name
     return key.xreplace({node: Symbol(name, real=True) for node, name in names.items()}), names
 
