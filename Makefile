@@ -10,7 +10,7 @@ READY := .venv/ready
 
 all: workbooks notebooks
 	@echo
-	@echo "Open workbooks/football.xlsx in any spreadsheet program,"
+	@echo "Open a workbook, say workbooks/football.xlsx, in any spreadsheet program,"
 	@echo "and the notebooks with: $(BIN)/jupyter lab notebooks"
 
 $(READY): environment.txt pyproject.toml
