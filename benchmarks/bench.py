@@ -57,7 +57,7 @@ def main() -> None:
             print(_row(line), flush=True)
     table = "\n".join(
         [
-            "| what | kfsheet | peer | ratio peer/kfsheet | note |",
+            "| what | kfsheet | peer | peer/kfsheet | wanted |",
             "|---|---|---|---|---|",
             *map(_row, lines),
         ]
@@ -341,7 +341,7 @@ def sheets() -> Iterator[Line]:
         engine = seconds(lambda: recalculate(path), repeats=3)
         if libreoffice():
             other = seconds(lambda: recalculate(path, "libreoffice"), repeats=3)
-            yield "recalculate it: LibreOffice", engine, other, "IronCalc is ours"
+            yield "recalculate it: LibreOffice", engine, other, ""
         if find_spec("formualizer"):
             bare = Path(folder) / "bare.xlsx"
             strip_values(path, bare)
