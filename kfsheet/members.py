@@ -12,14 +12,20 @@ import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kfsheet.errors import DataError, ModelError
-from kfsheet.evaluation import can_compile, check_data_name, checked_array, facts_of
+from kfsheet.evaluation import (
+    can_compile,
+    check_data_name,
+    checked_array,
+    checked_parameters,
+    facts_of,
+)
 from kfsheet.kernel import Kernel, compiled_function, kernel_of
 from kfsheet.source import python_source
 
@@ -137,7 +143,11 @@ class _Task:
     draws: Draws | None
     statistics: tuple[int, ...]
     nees: tuple[tuple[tuple[int, ...], tuple[tuple[int, int, int], ...]], ...]
-    compile: bool
+
+    @property
+    def compiled(self) -> bool:
+        """Whether the kernel is compiled; else its Python source is there."""
+        return not self.python
 
 
 @dataclass
@@ -261,7 +271,6 @@ def _first_task(
             )
             for spec in nees.values()
         ),
-        can_compile(),
     )
 
 
@@ -287,8 +296,6 @@ def _member_data(model: Recurrence, name: str, values: Any, members: int) -> np.
 def _member_parameters(model: Recurrence, given: Mapping[str, Any], members: int) -> np.ndarray:
     """Parameter values of shape (1 or members, parameters)."""
     many = {n: np.asarray(v) for n, v in given.items() if np.ndim(v) == 1}
-    from kfsheet.evaluation import checked_parameters
-
     one = checked_parameters(model, {n: v for n, v in given.items() if n not in many})
     table = np.tile(np.array([list(one.values())]), (members if many else 1, 1))
     for name, values in many.items():
@@ -312,7 +319,7 @@ def _computed(task: _Task, members: int, executor: Executor | None) -> _Sums:
     if executor is not None:
         return _gathered(task, members, executor)
     workers = os.cpu_count() or 1
-    if task.compile:
+    if task.compiled:
         compiled_function(task.kernel.source)  # once, before the threads ask for it together
     pool = ThreadPoolExecutor(workers)
     try:
@@ -351,8 +358,6 @@ def _bar(members: int) -> Any:
 
 
 def _groups(task: _Task, members: int) -> Iterator[_Task]:
-    from dataclasses import replace
-
     size = NUMBERS // (task.rows * max(1, len(task.kernel.columns)))
     size = min(max(size, FEWEST), MOST)
     for first in range(0, members, size):
@@ -380,7 +385,7 @@ def _run_group(task: _Task) -> _Sums:
             data[name] = np.ascontiguousarray([member[k] for member in drawn])
     out = np.empty((number, len(task.kernel.columns), task.rows))
     results = np.empty((number, len(task.kernel.scalars)))
-    run = _run_compiled if task.compile else _run_python
+    run = _run_compiled if task.compiled else _run_python
     run(task, data, out, results)
     if np.isinf(out).any():
         member = task.first + int(np.nonzero(np.isinf(out))[0][0])

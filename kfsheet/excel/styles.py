@@ -50,19 +50,20 @@ class Styles:
         self, sheet: Worksheet, content: object, kind: str, number_format: str = "", align: str = ""
     ) -> Cell:
         """A new cell of ``kind`` for ``sheet.append``."""
-        key = (kind, number_format, align)
-        if key not in self._known:
-            self._known[key] = self._array(*key)
-        return Cell(sheet, row=1, column=1, value=content, style_array=self._known[key])
+        style = self._style(kind, number_format, align)
+        return Cell(sheet, row=1, column=1, value=content, style_array=style)
 
     def number(self, kind: str, number_format: str, align: str) -> int:
         """The number by which the file knows a style."""
         key = (kind, number_format, align)
         if key not in self._numbers:
-            if key not in self._known:
-                self._known[key] = self._array(*key)
-            self._numbers[key] = self.book._cell_styles.add(self._known[key])
+            self._numbers[key] = self.book._cell_styles.add(self._style(*key))
         return self._numbers[key]
+
+    def _style(self, *key: str) -> object:
+        if key not in self._known:
+            self._known[key] = self._array(*key)
+        return self._known[key]
 
     def _array(self, kind: str, number_format: str, align: str) -> object:
         background, colour, bold, size = KINDS[kind]
