@@ -300,10 +300,9 @@ for name, values, k in (("NIS", NIS, 2), ("NEES", NEES, 4)):
     print(f"{name}: between {low:.2f} and {high:.2f} in {share:.0%} of the sweeps")
 
 # %% [markdown]
-# The innovations pass: they are independent from sweep to sweep, so 94 % is as near to 95 % as it
-# should be. Errors are not independent: a flight that errs, errs for long, and the NEES curve tells
-# the same story again and again. It wanders above the band for a while. At any one time 200 flights
-# are 200 samples; a mean of 4.24 beside 4 is what one such set in eight would show.
+# Both pass. The curve of the NIS is noise about 2. That of the NEES wanders within its band: a
+# flight that errs, errs for long, so neighbouring sweeps tell the same story again, and 200 flights
+# are 200 samples, not 260,000. Notebook 5 asks ten thousand.
 #
 # ## What $\Phi_s$ does
 #
@@ -352,7 +351,7 @@ for sigma, ax in zip((0.01, 0.03), axes, strict=True):
     ax.set_title(f"angle error {sigma} rad")
 
 # %% [markdown]
-# The radar alone errs three times as much; the filter hardly notices after the first minute.
+# The radar alone errs three times as much, and so, on its own scale, does the filter.
 #
 # ## Exercises
 #

@@ -53,7 +53,7 @@ printed.diff(tau).subs(tau, 0).simplify()
 
 # %% [markdown]
 # With the paper's kind of kick, 1.5 and 0.8 m/s over the ground and 4 m/s upwards, the printed
-# height would rise by 8 % too fast:
+# height would rise by 9 % too fast:
 
 # %%
 speed = np.hypot(np.hypot(1.5, 0.8), 4)
@@ -496,14 +496,15 @@ pd.DataFrame(wins, index=pd.Index(AFTER, name="frame")).T.map("{:.0%}".format)
 # ## What the data support
 #
 # 1. Filtering improves the **positions**, by 27 to 28 %. The paper's first claim holds.
-# 2. It does **not** improve the **fall point**: from frame 6 on the fit to filtered positions errs
-#    1 to 5 % *more*. Only before frame 5 is it better, by 13 % in frame 2, at errors of half a
-#    metre and more.
+# 2. It does **not** improve the **fall point**: in the six frames of the table the fit to filtered
+#    positions errs 1 to 5 % *more* with these draws; other draws move that by some percent either
+#    way. Only in the first frames is it better, by 13 % in frame 2, at errors of half a metre.
 # 3. A filter wins where it knows what the fit does not: which velocities are plausible (frame 2:
 #    0.74 against 1.07 m); that a frame may be an outlier (in the end 0.048 against 0.086 m); that
 #    its model may be wrong, if it is wrong enough (twice the drag: in the end 0.047 against 0.058
-#    m). With 30 % too little drag, or quadratic drag, the fit bends its other parameters and stays
-#    ahead: there, doubt costs more than it saves.
+#    m). With 30 % too little drag, or quadratic drag, the filter is ahead at frame 6, but in the end
+#    the fit, which bends its other parameters. These worlds were all flown with the doubt
+#    `Phi_s` = 0.5, so the loss may be the doubt's rather than the filter's: try less.
 #
 # All this holds for our $k/m$ and this kick. The paper's Figure 5 shows one flight of which we know
 # neither; what it claims in general, the experiment does not bear out.

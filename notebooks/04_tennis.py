@@ -318,7 +318,7 @@ pd.Series([f"{1 - value:.1e}" for value in left[:5]], range(1, 6), name="lost in
 
 # %% [markdown]
 # The slowest mode loses four millionths of its error in a turn: a quarter of a million turns for
-# one factor of $e$. The next loses 0.7 %, so all *seems* to settle. The loop has not converged; it
+# one factor of $e$. The next loses 0.75 %, so all *seems* to settle. The loop has not converged; it
 # has come to rest. With real cones it is worse: a point within its cone is not moved at all.
 #
 # ## What works
