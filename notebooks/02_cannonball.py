@@ -79,8 +79,9 @@ H = model.H
 H
 
 # %% [markdown]
-# The article prints the first entry without its minus, and labels two of the derivatives wrongly
-# (**misprints 2 and 3**). A sign can be checked without algebra: move the ball a metre to the right
+# The article prints the first entry without its minus, which its own list of derivatives has, and
+# labels one of that list $\partial\theta/\partial\dot{x}$ (**misprints 2 and 3**).
+# A sign can be checked without algebra: move the ball a metre to the right
 # and look whether the angle falls.
 
 # %%

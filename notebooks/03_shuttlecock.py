@@ -502,8 +502,8 @@ pd.DataFrame(wins, index=pd.Index(AFTER, name="frame")).T.map("{:.0%}".format)
 # 3. A filter wins where it knows what the fit does not: which velocities are plausible (frame 2:
 #    0.74 against 1.07 m); that a frame may be an outlier (in the end 0.048 against 0.086 m); that
 #    its model may be wrong, if it is wrong enough (twice the drag: in the end 0.047 against 0.058
-#    m). With 30 % too little drag, or quadratic drag, the filter is ahead at frame 6, but in the end
-#    the fit, which bends its other parameters. These worlds were all flown with the doubt
+#    m). With 30 % too little drag, or quadratic drag, the filter is ahead at frame 6, but in the
+#    end the fit, which bends its other parameters. These worlds were all flown with the doubt
 #    `Phi_s` = 0.5, so the loss may be the doubt's rather than the filter's: try less.
 #
 # All this holds for our $k/m$ and this kick. The paper's Figure 5 shows one flight of which we know

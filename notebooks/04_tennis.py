@@ -523,7 +523,7 @@ pd.DataFrame(
 #    $x_1$? Which of the innovations shows it?
 # 4. Sheet *Centroid*: with `phi` at 90, set `ambient` so that the shift falls below a tenth of a
 #    radius. How much light from everywhere does that take? Then raise `threshold`: who wins?
-# 5. Give the loop cones of 0.2 px instead of 0.6. Does depth improve? What does
+# 5. Give the loop cones of 0.4 px instead of 0.6. Does depth improve? What does
 #    `loop.iterate` say to 0.05?
 #
 # **Extend it**

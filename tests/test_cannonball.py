@@ -105,7 +105,7 @@ def test_the_linear_filter_equals_the_joint_update(frame):
 
 
 def test_jacobians_are_the_right_ones_not_the_printed_ones():
-    """The source lacks a minus in H's first entry and mislabels two derivatives."""
+    """The source lacks a minus in H's first entry and mislabels one derivative."""
     model = extended_model(cannonball)
     x, vx, y, vy = model.state
     X, Y = x - Symbol("x_R", real=True), y - Symbol("y_R", real=True)

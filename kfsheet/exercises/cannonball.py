@@ -249,7 +249,7 @@ CHARTS = (
             Series("x_true", "y_true", "truth", "truth"),
             Series("x_a", "y_a", "EKF", "line"),
         ),
-        note="Radar positions scatter by up to 600 m; the filter lies on the path.",
+        note="Radar positions scatter by 500 m and more; the filter lies on the path.",
     ),
     _residuals(
         "Range",
