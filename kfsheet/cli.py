@@ -141,12 +141,12 @@ def run_check(arguments: argparse.Namespace) -> int:
 
 
 def _check_one(path: Path, arguments: argparse.Namespace) -> int:
-    from kfsheet.excel.check import check_workbook
-    from kfsheet.excel.reading import exercise_name
-    from kfsheet.excel.recalculate import open_workbook
+    from kfsheet.excel.check import check
+    from kfsheet.excel.reading import Opened
     from kfsheet.exercises import exercise_names, load_exercise
 
-    name = exercise_name(open_workbook(path), path)
+    book = Opened(path, arguments.engine)
+    name = book.exercise_name()
     exercise = load_exercise(arguments.exercise) if arguments.exercise else None
     if exercise is None and name not in exercise_names():
         raise ModelError(
@@ -156,7 +156,7 @@ def _check_one(path: Path, arguments: argparse.Namespace) -> int:
     exercise = exercise or load_exercise(name)
     if exercise.name != name:
         raise ModelError(f"{path} was built from {name!r}, not from {exercise.name!r}")
-    report = check_workbook(path, exercise, arguments.engine)
+    report = check(book, exercise, arguments.engine)
     for change in report.changed:
         print(f"{path}: changed: {change}")
     lines = report.lines()

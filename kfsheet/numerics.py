@@ -17,7 +17,7 @@ def sign(x):
 
 
 def present(column):
-    return [x for x in column if observed(x)]
+    return [x for x in column if x == x]  # a missing value is not even equal to itself
 
 
 def count(column):
@@ -29,7 +29,8 @@ def total(column):
 
 
 def mean(column):
-    return total(column) / count(column) if count(column) else nan
+    values = present(column)
+    return fsum(values) / len(values) if values else nan
 
 
 def rms(column):

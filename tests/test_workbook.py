@@ -19,9 +19,11 @@ from kfsheet import (
     t,
     write_workbook,
 )
-from kfsheet.excel.layout import FIRST_ROW
-from kfsheet.excel.recalculate import convert, recalculate
-from kfsheet.excel.workbook import is_formula, workbook_bytes
+from kfsheet.excel.compose import Run, is_formula
+from kfsheet.excel.layout import FIRST_ROW, Layout
+from kfsheet.excel.recalculate import convert, open_in, recalculate
+from kfsheet.excel.workbook import compose, workbook_bytes
+from kfsheet.exercises import load_exercise
 from kfsheet.exercises.football import exercise, football
 
 SECTIONS = ["Reanalysis", "Free run", "Errors", "Pixel frame", "Goal line"]
@@ -103,6 +105,36 @@ def test_formulas_hold_small_numbers_and_functions_of_excel_2010_only(book):
 
 def test_formulas_are_short_enough_to_audit(book):
     assert max(len(cell.value) for _, cell in formulas(book)) < 120
+
+
+@pytest.mark.parametrize("name", ["football", "tennis_toss"])
+def test_a_formula_that_is_filled_down_is_stored_once_and_is_the_same_in_every_row(name, tmp_path):
+    """openpyxl moves the references of a shared formula; we print every row by itself."""
+    other = load_exercise(name)
+    layout, now = Layout.standard(other.model), Run.of(other.model)
+    path = write_workbook(other, tmp_path)
+    book = openpyxl.load_workbook(path)
+    for page in compose(other, layout, now, now):
+        for (row, column), piece in page.pieces.items():
+            if is_formula(piece.content):
+                assert book[page.title].cell(row, column).value == piece.content
+    with zipfile.ZipFile(path) as archive:
+        sheets = [archive.read(n).decode() for n in archive.namelist() if "worksheets/sheet" in n]
+    heads = re.findall(r'<f t="shared" ref="\w+:\w+" si="\d+">([^<]+)</f>', "".join(sheets))
+    followers = "".join(sheets).count('<f t="shared" si=')
+    assert len(heads) > 20 and followers > 5 * len(heads)
+    # Excel does not move a relative reference to another worksheet in a shared formula.
+    assert not any("!" in text for text in heads)
+
+
+def test_an_engine_takes_changes_back_before_the_next(football_file, engine):
+    book = open_in(football_file, engine)
+    before = book.values()
+    changed = book.values({"Parameters": {(5, 2): 0.2}, "Reanalysis": {(9, 3): None, (9, 7): 3.0}})
+    assert changed["Reanalysis"][9, 7] == 3
+    assert changed["Reanalysis"][8, 7] != before["Reanalysis"][8, 7]
+    assert (9, 3) not in changed["Reanalysis"]
+    assert book.values() == before
 
 
 def test_formulas_use_names_so_that_they_read_like_mathematics(book):

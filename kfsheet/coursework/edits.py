@@ -14,9 +14,8 @@ from kfsheet.coursework.places import Places
 from kfsheet.coursework.submission import Book, Content, Formula
 from kfsheet.coursework.worlds import Own
 from kfsheet.errors import FormulaError
-from kfsheet.excel.compose import Piece, Run, section_page
+from kfsheet.excel.compose import Piece, Run, is_formula, section_page
 from kfsheet.excel.layout import Address, Layout
-from kfsheet.excel.workbook import is_formula
 from kfsheet.exercise import Exercise
 
 SAMPLE = 40  # rows of a long table that are looked at

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator
-from io import BytesIO
 from pathlib import Path
 
 from openpyxl.formatting.rule import CellIsRule
@@ -29,11 +28,10 @@ from kfsheet.coursework.roster import Student
 from kfsheet.coursework.variation import own_numbers
 from kfsheet.coursework.worlds import Own
 from kfsheet.errors import ModelError
-from kfsheet.excel.compose import Page, Piece, Run
-from kfsheet.excel.finish import Value, finish
+from kfsheet.excel.compose import Page, Piece, Run, is_formula
 from kfsheet.excel.layout import FIRST_ROW, Layout
-from kfsheet.excel.recalculate import recalculate
-from kfsheet.excel.workbook import assemble, built_bytes, compose, is_formula
+from kfsheet.excel.recalculate import Values, recalculate
+from kfsheet.excel.workbook import Shell, assemble, built_bytes, compose
 from kfsheet.exercise import Exercise
 from kfsheet.files import write_file
 from kfsheet.names import LAST_COLUMN
@@ -97,10 +95,10 @@ def handout_bytes(exercise: Exercise, student: Student, secret: bytes) -> bytes:
     pages[1:1] = question_pages(exercise, layout, now, secret, (student.id, student.name))
     pages.append(pages.pop(2))  # the hidden sheet last
     book = assemble(exercise, layout, pages, now)
-    _finish_book(book, exercise, layout, tokens.token(secret, exercise.name, student.id))
-    saved = BytesIO()
-    book.save(saved)
-    return finish(saved.getvalue(), _calculated(saved.getvalue(), pages))
+    _finish_book(book, pages, exercise, tokens.token(secret, exercise.name, student.id))
+    shell = Shell(book, pages)
+    _store(pages, _calculated(shell.filled(pages)))
+    return shell.filled(pages)
 
 
 def handout_pages(exercise: Exercise, layout: Layout, now: Run) -> list[Page]:
@@ -148,25 +146,23 @@ def _mend_read_me(page: Page) -> None:
             page.put(row, column, SHEET, "index")
             page.put(row, column + 1, "what to fill in, and whether it looks right", align="wrap")
         if piece.kind == "formula" and column == 1:
-            page.put(row + 1, 1, "answer", "answer")
+            page.put(row + 1, 1, "answer", "sample")
             page.put(row + 1, 2, "an answer: fill in a formula", align="wrap")
 
 
-def _finish_book(book: Workbook, exercise: Exercise, layout: Layout, token: str) -> None:
+def _finish_book(book: Workbook, pages: list[Page], exercise: Exercise, token: str) -> None:
     book.custom_doc_props.append(StringProperty(name=TOKEN_PROPERTY, value=token))
     fill = PatternFill("solid", start_color="FFC6EFCE", end_color="FFC6EFCE")
     rule = CellIsRule(operator="equal", formula=[f'"{LOOKS_RIGHT}"'], fill=fill)
     area = f"H{FIRST}:H{FIRST + len(exercise.questions) - 1}"
     book[SHEET].conditional_formatting.add(area, rule)
     hide(book)
-    for sheet in book.worksheets:
-        _protect(sheet)
-    for row in book["Read me"].iter_rows(max_col=1):
-        row[0].protection = Protection(locked=True)  # the legend looks like an answer, and is none
+    for page in pages:
+        _protect(book[page.title], max(column for _, column in page.pieces))
     book.active = book.sheetnames.index(SHEET)
 
 
-def _protect(sheet: Worksheet) -> None:
+def _protect(sheet: Worksheet, width: int) -> None:
     """Lock what is there; free cells beside it, and rows and columns to insert, stay open."""
     protection = sheet.protection
     protection.sheet = True
@@ -174,7 +170,6 @@ def _protect(sheet: Worksheet) -> None:
     protection.insertColumns = protection.insertRows = False
     if sheet.title == HIDDEN:
         return
-    width = sheet.max_column
     for column in range(1, width + 1):
         letter = get_column_letter(column)
         sheet.column_dimensions[letter].protection = Protection(locked=False)
@@ -185,21 +180,19 @@ def _protect(sheet: Worksheet) -> None:
     sheet.column_dimensions[rest.index] = rest
 
 
-def _calculated(saved: bytes, pages: list[Page]) -> dict[str, dict[str, Value]]:
-    """What an engine finds in a workbook whose answers are still empty, to be stored in it."""
+def _calculated(content: bytes) -> Values:
+    """What an engine finds in a workbook whose answers are still empty."""
     with tempfile.TemporaryDirectory(prefix="kfsheet-") as folder:
         path = Path(folder) / "handout.xlsx"
-        path.write_bytes(saved)
-        values = recalculate(path)
-    return {
-        f"xl/worksheets/sheet{n}.xml": {
-            f"{get_column_letter(column)}{row}": _or_empty(values[page.title].get((row, column)))
-            for (row, column), piece in page.pieces.items()
-            if is_formula(piece.content)
-        }
-        for n, page in enumerate(pages, 1)
-    }
+        path.write_bytes(content)
+        return recalculate(path)
 
 
-def _or_empty(value: Value) -> Value:
-    return "" if value is None else value
+def _store(pages: list[Page], values: Values) -> None:
+    """Put an engine's values in the place of the key's, which would give the answers away."""
+    for page in pages:
+        found = values[page.title]
+        for place, piece in page.pieces.items():
+            if is_formula(piece.content):
+                value = found.get(place)
+                page.pieces[place] = piece._replace(stored="" if value is None else value)

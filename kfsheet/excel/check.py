@@ -21,9 +21,9 @@ from kfsheet.errors import DataError
 from kfsheet.excel.compare import Comparison
 from kfsheet.excel.compose import Run
 from kfsheet.excel.layout import Address
-from kfsheet.excel.reading import Inputs, layout_of, place
-from kfsheet.excel.recalculate import Changes, Values, open_workbook, recalculate
-from kfsheet.excel.workbook import compose
+from kfsheet.excel.package import Changes
+from kfsheet.excel.reading import Inputs, Opened, layout_of, place
+from kfsheet.excel.recalculate import Values
 from kfsheet.exercise import Exercise
 
 TOLERANCES = {"ironcalc": 1e-12, "libreoffice": 1e-11}
@@ -106,35 +106,37 @@ def check_workbook(path: str | Path, exercise: Exercise, engine: str = "ironcalc
     EngineError
         If the engine cannot do its work.
     """
-    path = Path(path)
-    book = open_workbook(path)
-    layout = layout_of(book, exercise, path)
+    return check(Opened(path, engine), exercise, engine)
+
+
+def check(book: Opened, exercise: Exercise, engine: str) -> Report:
+    """Compare a workbook that is open in an engine; see :func:`check_workbook`."""
+    layout = layout_of(book, exercise)
     built = Run.of(exercise.model)
-    values = recalculate(path, engine)
-    inputs = Inputs(book, layout, values, path)
+    inputs = Inputs(book, layout)
 
     def compare(values: Values, data: Data, parameters: dict[str, float]) -> Comparison:
         now = Run.of(exercise.model, data, parameters)
         comparison = Comparison(book, layout, values, TOLERANCES[engine])
-        comparison.run(compose(exercise, layout, now, built))
+        comparison.run(exercise, now, built)
         return comparison
 
-    first = compare(values, inputs.data, inputs.parameters)
+    first = compare(book.values, inputs.data, inputs.parameters)
     found, differing = first.problems, set(first.differing)
     for words, (changes, data, parameters) in _trials(inputs):
         try:
-            trial = compare(recalculate(path, engine, changes), data, parameters)
+            trial = compare(book.engine.values(changes), data, parameters)
         except DataError:
             continue  # the model has no value there; the other comparisons have to do
         told = {address: f"{reason} ({words})" for address, reason in trial.problems.items()}
         found, differing = {**told, **found}, differing | set(trial.differing)
     return Report(
-        path,
+        book.path,
         engine,
         first.cells,
         first.largest,
         list(_changed(inputs, built)),
-        _in_order(found, book.sheetnames),
+        _in_order(found, book.package.titles),
         len(differing - set(found)),
     )
 

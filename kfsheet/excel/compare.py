@@ -19,35 +19,45 @@ from collections.abc import Iterator
 from functools import cached_property
 from typing import Any
 
-from openpyxl import Workbook
+import numpy as np
 from sympy import Expr, Indexed, IndexedBase
 
 from kfsheet import numerics
 from kfsheet.checks import walk
-from kfsheet.excel.compose import Page, Piece
+from kfsheet.excel.checkpage import check_page
+from kfsheet.excel.compose import (
+    Page,
+    Piece,
+    Run,
+    charts_page,
+    is_formula,
+    parameters_page,
+    section_page,
+)
 from kfsheet.excel.layout import FIRST_ROW, Address, Layout
+from kfsheet.excel.reading import Opened
 from kfsheet.excel.recalculate import Values
-from kfsheet.excel.workbook import is_formula
-from kfsheet.expressions import lag, t
+from kfsheet.exercise import Exercise
+from kfsheet.expressions import Missing, lag, t
+from kfsheet.numerics import rms
+from kfsheet.parts import Column
 from kfsheet.pythoncode import python_code
 
 
 class Comparison:
     """Expected pieces beside an engine's values, and who is to blame for a difference."""
 
-    def __init__(self, book: Workbook, layout: Layout, values: Values, tolerance: float) -> None:
+    def __init__(self, book: Opened, layout: Layout, values: Values, tolerance: float) -> None:
         self.book, self.layout, self.values, self.tolerance = book, layout, values, tolerance
         self.cells, self.largest = 0, 0.0
         self.differing: dict[Address, Piece] = {}
         self.problems: dict[Address, str] = {}
 
-    def run(self, pages: list[Page]) -> None:
+    def run(self, exercise: Exercise, now: Run, built: Run) -> None:
         """Compare every formula cell, then look for the culprits among those that differ."""
-        for page in pages:
-            cells = self.book[page.title]._cells if page.title in self.book else {}
+        for page in self._pages(exercise, now, built):
             for (row, column), piece in page.pieces.items():
-                content = cells[row, column].value if (row, column) in cells else None
-                self._compare((page.title, row, column), piece, content)
+                self._compare((page.title, row, column), piece)
         homes = self._homes() if self.differing else {}
         blind = []
         for address, piece in self.differing.items():
@@ -61,18 +71,68 @@ class Comparison:
             if self._text(address) != _plain(piece.content) or not self.problems:
                 self.problems[address] = self._words(piece.stored, address)
 
-    def _compare(self, address: Address, piece: Piece, content: Any) -> None:
+    def _pages(self, exercise: Exercise, now: Run, built: Run) -> Iterator[Page]:
+        """The worksheets on which cells have to be looked at one by one."""
+        yield parameters_page(self.layout, now)
+        for section in self.layout.model.sections:
+            if not self._whole(section, now):
+                yield section_page(self.layout, section, now)
+        yield charts_page(exercise, self.layout, now)
+        yield check_page(self.layout, now, built)
+
+    def _whole(self, section: str, now: Run) -> bool:
+        """Whether a long worksheet agrees as a whole, so that none of its cells needs words."""
+        model, places = self.layout.model, self.layout.columns[section]
+        rows = range(FIRST_ROW, FIRST_ROW + model.rows)
+        steps = [self.book.value((section, row, places["t"])) for row in rows]
+        columns = [(c, places[c.name]) for c in model.sections[section] if not c.is_data]
+        columns += [(c, places["time"]) for c in model.clock_of(section)]
+        found = [self._column_agrees((section, at), c, now.columns[c.name]) for c, at in columns]
+        if steps != list(range(model.rows)) or None in found:
+            return False
+        self.cells += sum(cells for cells, _ in found)
+        self.largest = max([self.largest, *(far for _, far in found)])
+        return True
+
+    def _column_agrees(
+        self, place: tuple[str, int], column: Column, wanted: list[float]
+    ) -> tuple[int, float] | None:
+        """Formulas and largest difference of a column in which every cell agrees."""
+        (sheet, at), rules = place, column.rules
+        rows = range(FIRST_ROW, FIRST_ROW + len(wanted))
+        hollow = {FIRST_ROW + n for n, rule in enumerate(rules) if rule is Missing}
+        formulas = {row for row in self.book.formula_rows(sheet, at) if row in rows}
+        cells = self.values.get(sheet, {})
+        found = [cells.get((row, at)) for row in rows]
+        if formulas != set(rows) - hollow or bool in set(map(type, found)):
+            return None
+        try:
+            numbers = np.array([math.nan if v in (None, "") else v for v in found], dtype=float)
+        except ValueError:
+            return None
+        expected = np.array(wanted, dtype=float)
+        size = np.fmax(np.abs(expected), rms(wanted))
+        far = np.abs(numbers - expected) / np.where(size > 0, size, 1.0)
+        none = np.isnan(numbers)
+        if (none != np.isnan(expected)).any() or (far[~none] > self.tolerance).any():
+            return None
+        return len(formulas), float(far[~none].max(initial=0.0))
+
+    def _compare(self, address: Address, piece: Piece) -> None:
+        formula, value = self.book.is_formula(address), self.book.value(address)
         if is_formula(piece.content):
             self.cells += 1
-            if not is_formula(content):
-                found = "is empty" if content is None else f"holds {content!r}"
+            if not formula:
+                found = "is empty" if value is None else f"holds {value!r}"
                 self.problems[address] = f"{found} where a formula belongs"
             if not self._agree(address, piece.stored, piece.scale):
                 self.differing[address] = piece
-        elif piece.kind in ("formula", "index") and piece.content is None and content is not None:
-            self.problems[address] = f"holds {content!r}; there is no value in this row"
-        elif isinstance(piece.content, int) and piece.kind == "index" and content != piece.content:
-            self.problems[address] = f"holds {content!r}, not the step index {piece.content}"
+        elif piece.kind in ("formula", "index") and piece.content is None:
+            if formula or value is not None:
+                found = self.book.text(address) if formula else value
+                self.problems[address] = f"holds {found!r}; there is no value in this row"
+        elif isinstance(piece.content, int) and piece.kind == "index" and value != piece.content:
+            self.problems[address] = f"holds {value!r}, not the step index {piece.content}"
 
     def value(self, address: Address) -> Any:
         """What the engine found in a cell."""
@@ -171,8 +231,7 @@ class Comparison:
         return names
 
     def _text(self, address: Address) -> str:
-        sheet, row, column = address
-        return _plain(self.book[sheet].cell(row, column).value if sheet in self.book else None)
+        return _plain(self.book.text(address))
 
     def _words(self, expected: Any, address: Address) -> str:
         found = self.value(address)

@@ -38,6 +38,13 @@ class Piece(NamedTuple):
     align: str = ""
     scale: float = 0.0
     """What a difference is measured against where the value itself is smaller."""
+    rule: int | None = None
+    """Cells of a column with the same number hold the same formula, filled down."""
+
+
+def is_formula(content: object) -> bool:
+    """Whether the content of a cell is a formula."""
+    return isinstance(content, str) and content.startswith("=")
 
 
 @dataclass
@@ -126,10 +133,13 @@ def _formula_column(page: Page, layout: Layout, column: Column, at: int, now: Ru
         kind, shape = "index", "0.0##"
     rules = [(rule, layout.formula(rule, page.title)) for rule in column.rules]
     for row, value in enumerate(values):
-        rule, text = rules[min(row, len(column.start))]
+        number = min(row, len(column.start))
+        rule, text = rules[number]
         # A start without a value is an empty cell, not a formula that says so.
         content = None if rule is Missing else text(FIRST_ROW + row)
-        page.put(FIRST_ROW + row, at, content, kind, stored=stored(value), format=shape, scale=size)
+        page.pieces[FIRST_ROW + row, at] = Piece(
+            content, kind, stored(value), shape, scale=size, rule=number
+        )
 
 
 def parameters_page(layout: Layout, now: Run) -> Page:

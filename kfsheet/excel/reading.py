@@ -2,53 +2,78 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from openpyxl import Workbook
-from openpyxl.utils import coordinate_to_tuple, get_column_letter
+from openpyxl.utils import get_column_letter
 
 from kfsheet.errors import DataError, WorkbookError
 from kfsheet.excel.layout import FIRST_ROW, SYMBOL_ROW, Address, Layout, quote
-from kfsheet.excel.recalculate import Values
+from kfsheet.excel.package import Package
+from kfsheet.excel.recalculate import CellValue, Values, open_in, open_workbook
 from kfsheet.exercise import Exercise
 from kfsheet.recurrence import Recurrence
 
 EXERCISE_NAME = "kfsheet_exercise"
 
 
-def exercise_name(book: Workbook, path: Path) -> str:
-    """Name of the exercise that a workbook was built from.
+class Opened:
+    """A workbook as it stands: its names and formula cells, and the values an engine finds."""
 
-    Raises
-    ------
-    WorkbookError
-        If the workbook is not one of ours.
-    """
-    address = _named(book, EXERCISE_NAME)
-    value = address and book[address[0]].cell(*address[1:]).value
-    if not isinstance(value, str):
-        raise WorkbookError(
-            f"{path} is a workbook, but not one of ours (no cell is named {EXERCISE_NAME}); "
-            "make one with: kfsheet build"
-        )
-    return value
+    def __init__(self, path: str | Path, engine: str = "ironcalc") -> None:
+        self.path = Path(path)
+        self.package = Package(path)
+        self.engine = open_in(path, engine)
+        self.values: Values = self.engine.values()
+        self._formulas: dict[str, dict[int, set[int]]] = {}
+
+    def value(self, address: Address) -> CellValue:
+        """What the engine found in a cell."""
+        sheet, row, column = address
+        return self.values.get(sheet, {}).get((row, column))
+
+    def formula_rows(self, sheet: str, column: int) -> set[int]:
+        """Rows of a column that hold formulas."""
+        if sheet not in self._formulas:
+            known = sheet in self.package.titles
+            self._formulas[sheet] = self.package.formulas(sheet) if known else {}
+        return self._formulas[sheet].get(column, set())
+
+    def is_formula(self, address: Address) -> bool:
+        """Whether a cell holds a formula."""
+        sheet, row, column = address
+        return row in self.formula_rows(sheet, column)
+
+    def text(self, address: Address) -> str | None:
+        """The formula in a cell, written out where it is shared."""
+        sheet, row, column = address
+        return self._texts[sheet].cell(row, column).value if sheet in self._texts else None
+
+    @cached_property
+    def _texts(self) -> Workbook:
+        return open_workbook(self.path)
+
+    def exercise_name(self) -> str:
+        """Name of the exercise that the workbook was built from.
+
+        Raises
+        ------
+        WorkbookError
+            If the workbook is not one of ours.
+        """
+        address = self.package.named(EXERCISE_NAME)
+        value = address and self.value(address)
+        if not isinstance(value, str):
+            raise WorkbookError(
+                f"{self.path} is a workbook, but not one of ours (no cell is named "
+                f"{EXERCISE_NAME}); make one with: kfsheet build"
+            )
+        return value
 
 
-def _named(book: Workbook, name: str) -> Address | None:
-    """The one cell that a defined name stands for, if there is such a cell."""
-    if name not in book.defined_names:
-        return None
-    places = list(book.defined_names[name].destinations)
-    if len(places) != 1 or places[0][0] not in book.sheetnames:
-        return None
-    try:
-        return (places[0][0], *coordinate_to_tuple(places[0][1].replace("$", "")))
-    except ValueError:
-        return None
-
-
-def layout_of(book: Workbook, exercise: Exercise, path: Path) -> Layout:
+def layout_of(book: Opened, exercise: Exercise) -> Layout:
     """The layout of a workbook in which a user may have inserted or moved columns.
 
     Raises
@@ -56,18 +81,18 @@ def layout_of(book: Workbook, exercise: Exercise, path: Path) -> Layout:
     WorkbookError
         If a sheet, a column or a name is gone.
     """
-    model = exercise.model
+    model, path = exercise.model, book.path
     for sheet in ("Charts", "Check"):
-        if sheet not in book.sheetnames:
+        if sheet not in book.package.titles:
             raise WorkbookError(f"{path}: the sheet {sheet!r} is gone or renamed")
-    columns = {section: _columns_of(book, model, section, path) for section in model.sections}
+    columns = {section: _columns_of(book, model, section) for section in model.sections}
     scalars = {}
     for name in (*model.parameters, *model.derived_scalars, *model.summaries):
-        address = _named(book, name)
+        address = book.package.named(name)
         if address is None:
             raise WorkbookError(f"{path}: no cell is named {name}; build the workbook anew")
         sheet, row, column = address
-        if column == 1 or book[sheet].cell(row, column - 1).value != name:
+        if column == 1 or book.value((sheet, row, column - 1)) != name:
             raise WorkbookError(
                 f"{path}: the name {name} leads to {place(address)}, which is not labelled {name}; "
                 "move the name or the cell back"
@@ -76,11 +101,13 @@ def layout_of(book: Workbook, exercise: Exercise, path: Path) -> Layout:
     return Layout(model, columns, scalars)
 
 
-def _columns_of(book: Workbook, model: Recurrence, section: str, path: Path) -> dict[str, int]:
-    if section not in book.sheetnames:
+def _columns_of(book: Opened, model: Recurrence, section: str) -> dict[str, int]:
+    path = book.path
+    if section not in book.package.titles:
         raise WorkbookError(f"{path}: the sheet {section!r} is gone or renamed")
-    headers = [cell.value for cell in book[section][SYMBOL_ROW]]
-    found = {value: column for column, value in enumerate(headers, 1)}
+    cells = book.values[section].items()
+    found = {value: column for (row, column), value in cells if row == SYMBOL_ROW}
+    headers = [value for (row, _), value in cells if row == SYMBOL_ROW]
     keys = {"t": model.step_of(section)}
     columns = [*model.clock_of(section), *model.sections[section]]
     keys |= {column.name: column.name for column in columns}
@@ -103,9 +130,9 @@ def place(address: Address) -> str:
 class Inputs:
     """Parameters and data that stand in a workbook, with the cells that hold them."""
 
-    def __init__(self, book: Workbook, layout: Layout, values: Values, path: Path) -> None:
-        self.path, self.layout = path, layout
-        self._book, self._values = book, values
+    def __init__(self, book: Opened, layout: Layout) -> None:
+        self.path, self.layout = book.path, layout
+        self._book = book
         model = layout.model
         self.parameters = {
             name: p.checked(self._content(layout.scalars[name]), self._where(layout.scalars[name]))
@@ -121,7 +148,7 @@ class Inputs:
     def _series(self, name: str) -> list[float | None]:
         column, cells = self.layout.model.table[name], self.cells(name)
         sheet, row, number = cells[-1]
-        if self._book[sheet].cell(row + 1, number).value is not None:
+        if self._book.value((sheet, row + 1, number)) is not None:
             raise WorkbookError(
                 f"{self.path}: {place((sheet, row + 1, number))} lies below the table; "
                 f"its formulas end at row {row}"
@@ -135,10 +162,7 @@ class Inputs:
 
     def _content(self, address: Address) -> Any:
         """The number in a cell; of a formula, the value that the engine found."""
-        sheet, row, column = address
-        content = self._book[sheet].cell(row, column).value
-        if isinstance(content, str) and content.startswith("="):
-            content = self._values[sheet].get((row, column))
+        content = self._book.value(address)
         return None if isinstance(content, str) and not content.strip() else content
 
     def _where(self, address: Address) -> str:

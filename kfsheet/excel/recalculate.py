@@ -6,23 +6,21 @@ engine is given a copy whose formulas have no values.
 
 from __future__ import annotations
 
-import re
 import shutil
 import subprocess
 import tempfile
 import warnings
 import zipfile
 import zlib
-from collections.abc import Callable
 from pathlib import Path
+from typing import Protocol
 from xml.etree.ElementTree import ParseError
 
 import openpyxl
-from defusedxml import ElementTree
-from openpyxl.utils import get_column_letter
 from openpyxl.utils.exceptions import InvalidFileException
 
 from kfsheet.errors import EngineError, WorkbookError
+from kfsheet.excel.package import Changes, strip_values
 
 CellValue = float | int | str | bool | None
 Values = dict[str, dict[tuple[int, int], CellValue]]
@@ -34,23 +32,14 @@ LIBREOFFICE_HOMES = (
     "/Applications/LibreOffice.app/Contents/MacOS/soffice",
     r"C:\Program Files\LibreOffice\program\soffice.exe",
 )
-CELL = re.compile(rb"<((?:\w+:)?c)((?:\s[^>]*[^>/])?)>(.*?)</\1>", re.DOTALL)
-VALUE = re.compile(rb"<((?:\w+:)?v)\b[^>]*?(?:/>|>.*?</\1>)", re.DOTALL)
-TYPE = re.compile(rb'\s+t="[^"]*"')
-# openpyxl types an empty cell as a number, and IronCalc then reads a 0: a photo that is not there.
-EMPTY = re.compile(rb'(<(?:\w+:)?c\s[^>]*?)\s+t="n"(\s*/>|></(?:\w+:)?c>)')
-HOLLOW = re.compile(rb"<((?:\w+:)?c)(\s[^>]*?)\s*/>")
-ADDRESS = re.compile(rb'\sr="([A-Z]+\d+)"')
-MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
-LINKS = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
-# IronCalc 0.9.1 cannot load the comments that openpyxl writes; no formula needs them.
-COMMENTS = re.compile(rb'<Relationship\b[^>]*/(?:comments|vmlDrawing)"[^>]*/>')
-DRAWING = re.compile(rb"<legacyDrawing\b[^>]*/>")
-HAS_FORMULA = re.compile(rb"<(?:\w+:)?f\b")
 
 
-Changes = dict[str, dict[tuple[int, int], float | None]]
-"""Numbers to put into cells before calculating, by sheet and (row, column); None empties one."""
+class Engine(Protocol):
+    """A workbook in an engine, which calculates it as often as it is asked to."""
+
+    def values(self, changes: Changes | None = None) -> Values:
+        """Values of all cells that are not empty, with numbers put in first."""
+        ...
 
 
 def recalculate(
@@ -79,12 +68,14 @@ def recalculate(
     EngineError
         If the engine is unknown, missing, fails or takes longer than five minutes.
     """
+    return open_in(path, engine).values(changes)
+
+
+def open_in(path: str | Path, engine: str = "ironcalc") -> Engine:
+    """A workbook in an engine; see :func:`recalculate`. The file is read once, here."""
     if engine not in ENGINES:
         raise EngineError(f"no engine {engine!r}; there is {', '.join(ENGINES)}")
-    with tempfile.TemporaryDirectory(prefix="kfsheet-") as folder:
-        copy = Path(folder) / "copy.xlsx"
-        strip_values(path, copy, changes)
-        return ENGINES[engine](copy)
+    return ENGINES[engine](Path(path))
 
 
 def open_workbook(path: str | Path, *, data_only: bool = False) -> openpyxl.Workbook:
@@ -111,92 +102,61 @@ def open_workbook(path: str | Path, *, data_only: bool = False) -> openpyxl.Work
         raise WorkbookError(f"{path} is not a workbook (.xlsx): {detail}") from None
 
 
-def strip_values(path: str | Path, copy: str | Path, changes: Changes | None = None) -> None:
-    """Copy a workbook without the stored values of its formulas, and with ``changes`` put in.
+class IronCalc:
+    """A workbook in IronCalc: loaded once, calculated as often as inputs change."""
 
-    Raises
-    ------
-    WorkbookError
-        If the file cannot be read or is no workbook.
-    """
-    try:
-        with zipfile.ZipFile(path) as old, zipfile.ZipFile(copy, "w", zipfile.ZIP_DEFLATED) as new:
-            new_numbers = {_parts(old)[sheet]: cells for sheet, cells in (changes or {}).items()}
-            for item in old.infolist():
-                content = old.read(item)
-                if re.fullmatch(r"xl/worksheets/[^/]+\.xml", item.filename):
-                    content = _strip(content, new_numbers.get(item.filename, {}))
-                    content = DRAWING.sub(b"", content)
-                elif item.filename.startswith("xl/worksheets/_rels/"):
-                    content = COMMENTS.sub(b"", content)
-                new.writestr(item.filename, content)
-    except OSError as error:
-        raise WorkbookError(f"{path} cannot be read: {error.strerror or error}") from None
-    except (
-        zipfile.BadZipFile,
-        zipfile.LargeZipFile,
-        zlib.error,
-        EOFError,
-        KeyError,
-        ParseError,
-    ) as error:
-        raise WorkbookError(f"{path} is not a workbook (.xlsx): {error}") from None
+    def __init__(self, path: Path) -> None:
+        import ironcalc
 
+        with tempfile.TemporaryDirectory(prefix="kfsheet-") as folder:
+            copy = Path(folder) / "copy.xlsx"
+            strip_values(path, copy)
+            try:
+                self._model = ironcalc.load_from_xlsx(str(copy), "en", "UTC")
+            except Exception as error:  # its own kind and, from Rust, PanicException
+                raise EngineError(f"IronCalc cannot read the workbook: {error}") from None
+        self._sheets = [sheet["name"] for sheet in self._model.get_worksheets_properties()]
+        self._before: dict[tuple[int, int, int], CellValue] = {}
 
-def _parts(archive: zipfile.ZipFile) -> dict[str, str]:
-    """Name inside the zip of every worksheet, by title."""
-    links = ElementTree.fromstring(archive.read("xl/_rels/workbook.xml.rels"))
-    targets = {link.get("Id"): link.get("Target", "") for link in links}
-    sheets = ElementTree.fromstring(archive.read("xl/workbook.xml")).iter(f"{{{MAIN}}}sheet")
-    homes = {sheet.get("name"): targets[sheet.get(f"{{{LINKS}}}id")] for sheet in sheets}
-    return {
-        title: home.lstrip("/") if home.startswith("/") else f"xl/{home}"
-        for title, home in homes.items()
-    }
+    def values(self, changes: Changes | None = None) -> Values:
+        """Values of all cells that are not empty, with numbers put in first."""
+        self._restore()
+        for sheet, cells in (changes or {}).items():
+            number = self._sheets.index(sheet)
+            for (row, column), value in cells.items():
+                self._put(number, row, column, value)
+        try:
+            self._model.evaluate()
+        except Exception as error:
+            raise EngineError(f"IronCalc cannot calculate the workbook: {error}") from None
+        found: list[dict[tuple[int, int], CellValue]] = [{} for _ in self._sheets]
+        for sheet, row, column in self._model.get_all_cells():
+            found[sheet][row, column] = self._model.get_cell_value(sheet, row, column)
+        return dict(zip(self._sheets, found, strict=True))
 
+    def _put(self, sheet: int, row: int, column: int, value: float | None) -> None:
+        place = sheet, row, column
+        formula = self._model.get_cell_formula(*place)
+        self._before[place] = formula or self._model.get_cell_value(*place)
+        self._write(place, value)
 
-def _strip(xml: bytes, numbers: dict[tuple[int, int], float | None]) -> bytes:
-    new = {f"{get_column_letter(c)}{r}".encode(): v for (r, c), v in numbers.items()}
+    def _write(self, place: tuple[int, int, int], content: CellValue) -> None:
+        if content is None:
+            self._model.clear_cell_contents(*place)
+        elif isinstance(content, bool):
+            self._model.update_cell_with_bool(*place, content)
+        elif isinstance(content, int | float):
+            self._model.update_cell_with_number(*place, content)
+        elif content.startswith("="):
+            self._model.update_cell_with_formula(*place, content)
+        else:
+            self._model.update_cell_with_text(*place, content)
 
-    def cell(match: re.Match[bytes]) -> bytes:
-        tag, attributes, inside = match.groups()
-        address = ADDRESS.search(attributes)
-        if address and address[1] in new:
-            value = new[address[1]]
-            content = b"" if value is None else b"<v>%s</v>" % repr(value).encode()
-            return b"<%s%s>%s</%s>" % (tag, TYPE.sub(b"", attributes), content, tag)
-        if not HAS_FORMULA.search(inside):
-            return match[0]
-        # An empty value, not none at all: IronCalc reports a formula that lacks the element.
-        emptied = VALUE.sub(rb"<\1></\1>", inside)
-        return b"<%s%s>%s</%s>" % (tag, TYPE.sub(b"", attributes), emptied, tag)
-
-    def filled(match: re.Match[bytes]) -> bytes:
-        tag, attributes = match.groups()
-        address = ADDRESS.search(attributes)
-        value = new.get(address[1]) if address else None
-        if value is None:
-            return match[0]
-        content = b"<v>%s</v>" % repr(value).encode()
-        return b"<%s%s>%s</%s>" % (tag, TYPE.sub(b"", attributes), content, tag)
-
-    xml = EMPTY.sub(rb"\1\2", CELL.sub(cell, xml))
-    return HOLLOW.sub(filled, xml) if new else xml
-
-
-def _ironcalc(copy: Path) -> Values:
-    import ironcalc
-
-    try:
-        model = ironcalc.load_from_xlsx(str(copy), "en", "UTC")
-        model.evaluate()
-    except Exception as error:  # IronCalc raises its own kind and, from Rust, PanicException
-        raise EngineError(f"IronCalc cannot calculate the workbook: {error}") from None
-    names = [sheet["name"] for sheet in model.get_worksheets_properties()]
-    values: Values = {name: {} for name in names}
-    for sheet, row, column in model.get_all_cells():
-        values[names[sheet]][row, column] = model.get_cell_value(sheet, row, column)
-    return values
+    def _restore(self) -> None:
+        """Take the last changes back."""
+        for place, content in self._before.items():
+            self._write(place, content)
+        self._before.clear()
 
 
 def libreoffice() -> str | None:
@@ -205,18 +165,28 @@ def libreoffice() -> str | None:
     return on_path or next((place for place in LIBREOFFICE_HOMES if Path(place).exists()), None)
 
 
-def _libreoffice(copy: Path) -> Values:
-    converted = convert(copy, copy.parent / "out", "xlsx:Calc MS Excel 2007 XML")
-    book = open_workbook(converted, data_only=True)
-    return {
-        sheet.title: {
-            (cell.row, cell.column): cell.value
-            for row in sheet.iter_rows()
-            for cell in row
-            if cell.value is not None
+class LibreOffice:
+    """A workbook in LibreOffice, which opens a copy of it each time."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def values(self, changes: Changes | None = None) -> Values:
+        """Values of all cells that are not empty, with numbers put in first."""
+        with tempfile.TemporaryDirectory(prefix="kfsheet-") as folder:
+            copy = Path(folder) / "copy.xlsx"
+            strip_values(self._path, copy, changes)
+            converted = convert(copy, Path(folder) / "out", "xlsx:Calc MS Excel 2007 XML")
+            book = open_workbook(converted, data_only=True)
+        return {
+            sheet.title: {
+                (cell.row, cell.column): cell.value
+                for row in sheet.iter_rows()
+                for cell in row
+                if cell.value is not None
+            }
+            for sheet in book.worksheets
         }
-        for sheet in book.worksheets
-    }
 
 
 def convert(path: Path, folder: Path, kind: str) -> Path:
@@ -249,4 +219,7 @@ def convert(path: Path, folder: Path, kind: str) -> Path:
     return result
 
 
-ENGINES: dict[str, Callable[[Path], Values]] = {"ironcalc": _ironcalc, "libreoffice": _libreoffice}
+ENGINES: dict[str, type[IronCalc] | type[LibreOffice]] = {
+    "ironcalc": IronCalc,
+    "libreoffice": LibreOffice,
+}

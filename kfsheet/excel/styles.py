@@ -25,6 +25,7 @@ KINDS = {
     "formula": ("FFFFFF", "000000", False, 11),
     "index": ("F2F2F2", "595959", False, 11),
     "answer": ("FCE4D6", "000000", False, 11),
+    "sample": ("FCE4D6", "000000", False, 11),  # an answer in a legend: it stays locked
 }
 LEGEND = {
     "parameter": "a parameter: change it and watch what happens",
@@ -45,13 +46,6 @@ class Styles:
     @cached_property
     def _scratch(self) -> Worksheet:
         return self.book.create_sheet("scratch")
-
-    def cell(
-        self, sheet: Worksheet, content: object, kind: str, number_format: str = "", align: str = ""
-    ) -> Cell:
-        """A new cell of ``kind`` for ``sheet.append``."""
-        style = self._style(kind, number_format, align)
-        return Cell(sheet, row=1, column=1, value=content, style_array=style)
 
     def number(self, kind: str, number_format: str, align: str) -> int:
         """The number by which the file knows a style."""

@@ -26,7 +26,7 @@ from kfsheet.excel.compose import (
     section_page,
 )
 from kfsheet.excel.drawing import draw
-from kfsheet.excel.finish import Value, finish, untouched
+from kfsheet.excel.finish import finish, untouched
 from kfsheet.excel.layout import FIRST_ROW, Layout
 from kfsheet.excel.styles import Styles
 from kfsheet.exercise import Exercise
@@ -57,13 +57,26 @@ def workbook_bytes(exercise: Exercise) -> bytes:
 def built_bytes(exercise: Exercise, layout: Layout, now: Run) -> bytes:
     """The workbook of an exercise for a run with other parameters and data."""
     pages = compose(exercise, layout, now, now)
-    book = assemble(exercise, layout, pages, now, cells=False)
-    styles = Styles(book)
-    sheets = {part(n): sheet_data(page, styles.number) for n, page in enumerate(pages, 1)}
-    styles.close()
-    saved = BytesIO()
-    book.save(saved)
-    return finish(saved.getvalue(), sheets=sheets)
+    return Shell(assemble(exercise, layout, pages, now), pages).filled(pages)
+
+
+class Shell:
+    """A saved workbook without cells, which can be filled with them more than once."""
+
+    def __init__(self, book: Workbook, pages: list[Page]) -> None:
+        self._styles = Styles(book)
+        for page in pages:
+            for piece in page.pieces.values():
+                self._styles.number(piece.kind, piece.format, piece.align)
+        self._styles.close()
+        saved = BytesIO()
+        book.save(saved)
+        self._saved = saved.getvalue()
+
+    def filled(self, pages: list[Page]) -> bytes:
+        """The file with the cells of ``pages``, of the styles that it was saved with."""
+        sheets = {part(n): sheet_data(page, self._styles.number) for n, page in enumerate(pages, 1)}
+        return finish(self._saved, sheets)
 
 
 def part(number: int) -> str:
@@ -71,19 +84,12 @@ def part(number: int) -> str:
     return f"xl/worksheets/sheet{number}.xml"
 
 
-def assemble(
-    exercise: Exercise, layout: Layout, pages: list[Page], now: Run, *, cells: bool = True
-) -> Workbook:
-    """Pages as a workbook of openpyxl, with names, validations and charts; if asked, with cells."""
+def assemble(exercise: Exercise, layout: Layout, pages: list[Page], now: Run) -> Workbook:
+    """Pages as a workbook of openpyxl, with names, validations and charts, but without cells."""
     book = Workbook()
     book.remove(book.active)
-    styles = Styles(book)
     for page in pages:
-        sheet = book.create_sheet(page.title)
-        if cells:
-            _fill(sheet, styles, page)
-        _dress(sheet, page)
-    styles.close()
+        _dress(book.create_sheet(page.title), page)
     _define_names(book, layout, pages)
     _add_validations(book["Parameters"], layout, now)
     if "Check" in book.sheetnames:
@@ -128,16 +134,6 @@ def write_workbook(exercise: Exercise, path: str | Path, *, force: bool = False)
             "or replace it with: kfsheet build --force"
         )
     return write_file(target, workbook_bytes(exercise))
-
-
-def _fill(sheet: Worksheet, styles: Styles, page: Page) -> None:
-    height = max(row for row, _ in page.pieces)
-    width = max(column for _, column in page.pieces)
-    for row in range(1, height + 1):
-        cells = [page.pieces.get((row, column)) for column in range(1, width + 1)]
-        sheet.append(
-            [p and styles.cell(sheet, p.content, p.kind, p.format, p.align) for p in cells]
-        )
 
 
 def _dress(sheet: Worksheet, page: Page) -> None:
@@ -207,29 +203,3 @@ def _describe(book: Workbook, exercise: Exercise) -> None:
     book.properties.creator, book.properties.title = "kfsheet", exercise.title
     book.custom_doc_props.append(StringProperty(name="kfsheet exercise", value=exercise.name))
     book.active = 0
-
-
-def _stored_values(pages: list[Page]) -> dict[str, dict[str, Value]]:
-    """Values of formula cells, and numbers of 17 digits, by part of the zip.
-
-    openpyxl numbers sheets in order, and writes 16 digits.
-    """
-    return {
-        part(n): {
-            f"{get_column_letter(column)}{row}": (
-                piece.stored if is_formula(piece.content) else piece.content
-            )
-            for (row, column), piece in page.pieces.items()
-            if is_formula(piece.content) or _shortened(piece.content)
-        }
-        for n, page in enumerate(pages, 1)
-    }
-
-
-def _shortened(content: object) -> bool:
-    return isinstance(content, float) and float(f"{content:.16g}") != content
-
-
-def is_formula(content: object) -> bool:
-    """Whether the content of a cell is a formula."""
-    return isinstance(content, str) and content.startswith("=")
