@@ -130,8 +130,10 @@ class IronCalc:
         except Exception as error:
             raise EngineError(f"IronCalc cannot calculate the workbook: {error}") from None
         found: list[dict[tuple[int, int], CellValue]] = [{} for _ in self._sheets]
+        read = self._model.get_cell_value
         for sheet, row, column in self._model.get_all_cells():
-            found[sheet][row, column] = self._model.get_cell_value(sheet, row, column)
+            if (value := read(sheet, row, column)) is not None:
+                found[sheet][row, column] = value
         return dict(zip(self._sheets, found, strict=True))
 
     def _put(self, sheet: int, row: int, column: int, value: float | None) -> None:
