@@ -97,11 +97,13 @@ def _add_coursework(commands: argparse._SubParsersAction, exercise: str) -> None
             help="the secret of the course (default: kfsheet.secret beside the roster)",
         )
         command.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
+        command.add_argument(
+            "--jobs", type=_count, default=1, metavar="N", help="processes (default: 1)"
+        )
     handout.add_argument(
         "--notebook", action="store_true", help="also write an assignment for nbgrader"
     )
     handout.set_defaults(run=run_handout)
-    grade.add_argument("--jobs", type=_count, default=1, metavar="N", help="processes (default: 1)")
     grade.set_defaults(run=run_grade)
 
 
@@ -205,8 +207,11 @@ def run_handout(arguments: argparse.Namespace) -> int:
     exercise = load_exercise(arguments.exercise)
     students = read_roster(arguments.roster)
     secret = _secret(arguments, make=True)
-    made = write_handouts(exercise, students, secret, arguments.out)
-    count = sum(1 for _ in progress(made, "handout", [s.id for s in students]))
+    made = write_handouts(
+        exercise, arguments.exercise, students, secret, arguments.out, jobs=arguments.jobs
+    )
+    numbers = list(map(str, range(1, len(students) + 1)))
+    count = sum(1 for _ in progress(made, "handout", numbers))
     print(f"{count} workbooks in {Path(arguments.out) / 'students'}")
     print(f"their solutions in {Path(arguments.out) / 'solutions'}; do not hand these out")
     if arguments.notebook:

@@ -4,6 +4,7 @@ import csv
 import os
 import shutil
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import openpyxl
 import pytest
@@ -12,6 +13,7 @@ from students import ADA, SECRET, Paper
 
 from kfsheet import DataError, ModelError, cli, load_exercise
 from kfsheet.coursework.collecting import owner
+from kfsheet.coursework.grading import grade
 from kfsheet.coursework.handout import handout_bytes, own_run
 from kfsheet.coursework.questions import FIRST, LOOKS_RIGHT, NOT_YET
 from kfsheet.coursework.roster import Student, harmless, read_roster
@@ -228,7 +230,7 @@ def course(tmp_path_factory):
     (home / "roster.csv").write_text("\ufeff" + "\n".join(lines), encoding="utf-8")
     (home / "secret").write_bytes(SECRET)
     ask = ("--roster", home / "roster.csv", "--secret", home / "secret")
-    assert call("handout", "football", *ask, "--out", home / "out", "--notebook") == 0
+    assert call("handout", "football", *ask, "--out", home / "out", "--notebook", "--jobs", 2) == 0
     papers = {
         s.id: Paper(FOOTBALL, s, (home / f"out/students/{s.id}/football.xlsx").read_bytes())
         for s in STUDENTS
@@ -280,6 +282,22 @@ def test_everybody_on_the_roster_has_a_row_with_score_and_status(graded):
     }
     assert (rows["s003"]["K_x"], rows["s003"]["u"], rows["s003"]["w"]) == ("0", "0", "2")
     assert "2 files came back; the newest counts" in rows["s003"]["remark"]
+
+
+def test_every_process_writes_the_same_workbook(course):
+    home, _, _ = course
+    written = (home / "out/students/s002/football.xlsx").read_bytes()
+    assert written == handout_bytes(FOOTBALL, STUDENTS[1], SECRET)
+
+
+def test_any_executor_gives_the_same_marks(course, graded, tmp_path):
+    _, _, sub = course
+    with ThreadPoolExecutor(2) as executor:
+        results, _ = grade(FOOTBALL, "football", sub, STUDENTS, SECRET, tmp_path, executor=executor)
+    found = {r.student.id: (f"{r.score:g}", r.status) for r in results}
+    assert found == {
+        line["id"]: (line["score"], line["status"]) for line in table(graded / "grades.csv")
+    }
 
 
 def test_the_learning_platforms_get_grades_and_feedback(graded):

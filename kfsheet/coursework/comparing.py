@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import lru_cache
+from weakref import WeakKeyDictionary
 
 import mpmath
 from sympy import Basic
@@ -48,18 +49,17 @@ class Question:
         self.scene, self.name, self.row = scene, name, row
         scalar = scene.model.derived_scalars.get(name)
         self.key = scalar.expression if scalar else scene.model.column(name).definition(row)
-        self._wanted: dict[tuple, list[Value | str]] = {}
+        self._wanted: WeakKeyDictionary[World, Value | str] = WeakKeyDictionary()
 
     def worlds(self, depth: int, own: Own = NOBODY) -> list[World]:
         """The points at which formulas are compared."""
         return self.scene.worlds(self.name, self.row, depth, own)
 
-    def wanted(self, depth: int, own: Own = NOBODY) -> list[Value | str]:
-        """Values of the key."""
-        at = (depth, own)
-        if at not in self._wanted:
-            self._wanted[at] = [worth(self.key, world) for world in self.worlds(depth, own)]
-        return self._wanted[at]
+    def wanted(self, world: World) -> Value | str:
+        """Value of the key; most wrong formulas are found out at the first point."""
+        if world not in self._wanted:
+            self._wanted[world] = worth(self.key, world)
+        return self._wanted[world]
 
     def differences(
         self,
@@ -69,14 +69,13 @@ class Question:
         gaps: bool = True,
     ) -> Iterator[float]:
         """Relative differences at the points that can tell something."""
-        pairs = zip(self.worlds(depth, own), self.wanted(depth, own), strict=True)
-        for world, wanted in pairs:
+        for world in self.worlds(depth, own):
             if world.gaps and not gaps:
                 continue
             found = worth(expression, world)
             if world.wild and found is ERROR:
                 continue  # beyond the range for which the formula is meant
-            if (far := difference(found, wanted)) is not None:
+            if (far := difference(found, self.wanted(world))) is not None:
                 yield far
 
     def same(self, expression: Basic, own: Own = NOBODY, gaps: bool = True) -> bool:
@@ -91,7 +90,8 @@ class Question:
             if far > TOLERANCE:
                 return False
             count += 1
-        numbers = sum(isinstance(v, mpmath.mpf) for v in self.wanted(depth, own))
+        wanted = (self.wanted(world) for world in self.worlds(depth, own))
+        numbers = sum(isinstance(value, mpmath.mpf) for value in wanted)
         return count >= ENOUGH and numbers >= ENOUGH
 
     def nearly(self, expression: Basic) -> bool:

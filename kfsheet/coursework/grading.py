@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from kfsheet.coursework.assessing import GRADED, NO_TOKEN, OTHER, Assessment, as
 from kfsheet.coursework.collecting import owner, submitted_files
 from kfsheet.coursework.judge import Mark
 from kfsheet.coursework.roster import Student
-from kfsheet.coursework.workers import SECONDS, Failed, Pool
+from kfsheet.coursework.workers import SECONDS, Failed, Pool, run_on
 from kfsheet.exercise import Exercise
 from kfsheet.files import write_file
 
@@ -81,6 +82,7 @@ def grade(
     *,
     jobs: int = 1,
     seconds: float = SECONDS,
+    executor: Executor | None = None,
     progress: Callable[[Iterable, int], Iterable] = lambda items, _: items,
 ) -> tuple[list[Result], list[Handed]]:
     """Judge every file once, and say what every student gets.
@@ -102,6 +104,9 @@ def grade(
         Processes.
     seconds : float
         What one file may take.
+    executor : Executor, optional
+        Anything with the interface of :mod:`concurrent.futures` that judges in the place of
+        ``jobs`` processes; its workers must see the same files, and be allowed to start processes.
     progress : function, optional
         Wraps the files as they are finished; called with them and their number.
 
@@ -113,7 +118,13 @@ def grade(
     folder, out = Path(submissions), Path(out)
     files = submitted_files(folder)
     keys = {path: _key(path, exercise, secret) for path in files}
-    judged = _judged(keys, spec, secret, out / "work", (jobs, seconds), progress)
+
+    def run(tasks: list[tuple]) -> Iterator[tuple[tuple, Any]]:
+        if executor is not None:
+            return run_on(executor, assess, tasks, seconds=seconds)
+        return Pool(assess, jobs, seconds=seconds).run(tasks)
+
+    judged = _judged(keys, spec, secret, out / "work", run, progress)
     handed = [
         Handed(path, owner(path, folder, students), keys[path], judged[keys[path]])
         for path in files
@@ -141,15 +152,14 @@ def _judged(
     spec: str,
     secret: bytes,
     work: Path,
-    limits: tuple[int, float],
+    run: Callable[[list[tuple]], Iterator[tuple[tuple, Any]]],
     progress: Callable[[Iterable, int], Iterable],
 ) -> dict[str, Assessment]:
     known = {key: found for key in keys.values() if (found := _kept(work, key))}
     new = {key: path for path, key in keys.items() if key not in known}
     tasks = [(spec, secret, path, work / f"{key}.xlsx") for key, path in new.items()]
     names = {path: key for key, path in new.items()}
-    pool = Pool(assess, limits[0], seconds=limits[1])
-    for task, found in progress(pool.run(tasks), len(tasks)):
+    for task, found in progress(run(tasks), len(tasks)):
         key = names[task[2]]
         known[key] = _failed(found) if isinstance(found, Failed) else found
         if not isinstance(found, Failed):

@@ -26,13 +26,15 @@ from kfsheet.coursework.questions import (
 )
 from kfsheet.coursework.roster import Student
 from kfsheet.coursework.variation import own_numbers
+from kfsheet.coursework.workers import Failed, Pool
 from kfsheet.coursework.worlds import Own
-from kfsheet.errors import ModelError
+from kfsheet.errors import ModelError, WorkbookError
 from kfsheet.excel.compose import Page, Piece, Run, is_formula
 from kfsheet.excel.layout import FIRST_ROW, Layout
 from kfsheet.excel.recalculate import Values, recalculate
 from kfsheet.excel.workbook import Shell, assemble, built_bytes, compose
 from kfsheet.exercise import Exercise
+from kfsheet.exercises import load_exercise
 from kfsheet.files import write_file
 from kfsheet.names import LAST_COLUMN
 
@@ -40,20 +42,28 @@ TOKEN_PROPERTY = "kfsheet token"
 
 
 def write_handouts(
-    exercise: Exercise, students: list[Student], secret: bytes, out: str | Path
+    exercise: Exercise,
+    spec: str,
+    students: list[Student],
+    secret: bytes,
+    out: str | Path,
+    *,
+    jobs: int = 1,
 ) -> Iterator[Path]:
-    """Write every student's workbook and its solution, one student at a time.
+    """Write every student's workbook and its solution.
 
     Parameters
     ----------
-    exercise : Exercise
-        It must list questions.
+    exercise, spec : Exercise, str
+        It must list questions; and the name or file by which a worker process finds it.
     students : list of Student
         Who gets one.
     secret : bytes
         See :mod:`kfsheet.coursework.tokens`.
     out : path
         Folder; ``students/ID/EXERCISE.xlsx`` and ``solutions/ID/EXERCISE.xlsx`` are written there.
+    jobs : int
+        Processes.
 
     Yields
     ------
@@ -69,12 +79,27 @@ def write_handouts(
     """
     if not exercise.questions:
         raise ModelError(f"{exercise.name} asks no questions; list them in Exercise(questions=...)")
-    for student in students:
-        own = own_numbers(exercise, secret, student.id)
-        solution = Path(out) / "solutions" / student.id / f"{exercise.name}.xlsx"
-        write_file(solution, solution_bytes(exercise, own))
-        path = Path(out) / "students" / student.id / f"{exercise.name}.xlsx"
-        yield write_file(path, handout_bytes(exercise, student, secret))
+    if jobs == 1:
+        for student in students:
+            yield _write_both(exercise, student, secret, Path(out))
+        return
+    tasks = [(spec, student, secret, Path(out)) for student in students]
+    for (_, student, *_), written in Pool(_write_in_process, jobs).run(tasks):
+        if isinstance(written, Failed):
+            raise WorkbookError(f"the workbook of {student.id} was not written: {written.reason}")
+        yield written
+
+
+def _write_in_process(spec: str, student: Student, secret: bytes, out: Path) -> Path:
+    return _write_both(load_exercise(spec), student, secret, out)
+
+
+def _write_both(exercise: Exercise, student: Student, secret: bytes, out: Path) -> Path:
+    own = own_numbers(exercise, secret, student.id)
+    solution = out / "solutions" / student.id / f"{exercise.name}.xlsx"
+    write_file(solution, solution_bytes(exercise, own))
+    path = out / "students" / student.id / f"{exercise.name}.xlsx"
+    return write_file(path, handout_bytes(exercise, student, secret))
 
 
 def own_run(exercise: Exercise, own: Own) -> Run:

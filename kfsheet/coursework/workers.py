@@ -9,13 +9,15 @@ from __future__ import annotations
 import multiprocessing
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
 MEMORY = 3 * 2**30  # bytes of address space
 SECONDS = 120.0
+BATCH = 25  # files that a worker of an executor judges before it reports
 
 
 READY = "ready"
@@ -54,6 +56,34 @@ def _limit(memory: int) -> None:
 
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def run_on(
+    executor: Executor,
+    function: Callable[..., Any],
+    tasks: Sequence[tuple],
+    *,
+    seconds: float = SECONDS,
+) -> Iterator[tuple[tuple, Any]]:
+    """Pairs of task and result from any executor, on this machine or on others.
+
+    Each of its workers judges files in a process of its own, so that the limits hold there too;
+    dask's workers may start one if they run with ``distributed.worker.daemon: False``.
+    """
+    batches = [tasks[n : n + BATCH] for n in range(0, len(tasks), BATCH)]
+    running = {executor.submit(_batch, function, batch, seconds): batch for batch in batches}
+    try:
+        for future in as_completed(running):
+            error = future.exception()
+            failed = Failed(f"{type(error).__name__}: {error}")
+            yield from future.result() if error is None else [(t, failed) for t in running[future]]
+    finally:
+        for future in running:
+            future.cancel()
+
+
+def _batch(function: Callable[..., Any], tasks: Sequence[tuple], seconds: float) -> list[tuple]:
+    return list(Pool(function, 1, seconds=seconds).run(tasks))
 
 
 class Pool:
