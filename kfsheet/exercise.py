@@ -54,6 +54,8 @@ class Exercise:
         Data columns that hold standard-normal draws; every student gets other ones.
     frozen : tuple of str
         Worksheets whose formulas would give answers away; handouts hold their values only.
+    veiled : tuple of str
+        Columns that stay live in handouts, but hide their formulas: one repeats an answer's.
     draw : function of (generator, parameters), optional
         Draws other data columns anew, as lists by name; None in a list is a missing value.
 
@@ -74,6 +76,7 @@ class Exercise:
     vary: dict[str, tuple[float, float]] = field(default_factory=dict)
     noise: tuple[str, ...] = ()
     frozen: tuple[str, ...] = ()
+    veiled: tuple[str, ...] = ()
     draw: Draw | None = None
 
     def __post_init__(self) -> None:
@@ -93,6 +96,8 @@ class Exercise:
             self.model.column(self.greyed)
         if unknown := {*self.sections, *self.frozen} - set(self.model.sections):
             raise ModelError(f"{self.name} has no section {unknown.pop()!r}")
+        for name in self.veiled:
+            self.model.column(name)
         self._check_variation()
 
     def _check_variation(self) -> None:

@@ -7,7 +7,7 @@ solution, and changed as text, so that the grader's own algebra has no hand in t
 import re
 
 import openpyxl
-from openpyxl.utils import get_column_letter
+from openpyxl.utils import column_index_from_string, get_column_letter
 
 from kfsheet.coursework.handout import handout_bytes, own_run
 from kfsheet.coursework.judge import asked_steps
@@ -139,3 +139,54 @@ def broken_fill_down(paper, name, last=3):
         broken = n >= len(cells) - last
         fixed = broken and f"${here[1]}${cells[0][0].row}"
         cell.value = text[: here.start()] + fixed + text[here.end() :] if broken else text
+
+
+def inserted(book, sections, rows=2, columns=1):
+    """Rows above and a column before the table of each section; references follow, as in Excel."""
+    titles = {name: sheet for name in sections for sheet in (name, f"'{name}'")}
+    pattern = re.compile(
+        r"(?<![\w$.!'])((?:'[^']+'|\w+)!)?(\$?)([A-Z]{1,2})(\$?)(\d+)(?![\w(!])"
+        r"(?::(\$?)([A-Z]{1,2})(\$?)(\d+))?"
+    )
+
+    def corner(column_fixed, letters, row_fixed, row):
+        number = column_index_from_string(letters) + columns
+        return f"{column_fixed}{get_column_letter(number)}{row_fixed}{int(row) + rows}"
+
+    def moved(text, own):
+        def reference(match):
+            sheet = match[1][:-1].strip("'") if match[1] else own
+            if sheet not in titles:
+                return match[0]
+            last = f":{corner(*match.groups()[5:])}" if match[7] else ""
+            return f"{match[1] or ''}{corner(*match.groups()[1:5])}{last}"
+
+        return pattern.sub(reference, text)
+
+    for sheet in book:
+        moves = sheet.title in titles
+        cells = {(c.row, c.column): c.value for line in sheet.iter_rows() for c in line}
+        for place, value in cells.items():
+            if moves:
+                sheet.cell(*place).value = None
+            elif isinstance(value, str) and value.startswith("="):
+                sheet.cell(*place).value = moved(value, sheet.title)
+        for (row, column), value in cells.items():
+            if moves and value is not None:
+                formula = isinstance(value, str) and value.startswith("=")
+                new = moved(value, sheet.title) if formula else value
+                sheet.cell(row + rows, column + columns).value = new
+
+
+def renamed(book, old, new):
+    """A worksheet under another name and in another place; every reference follows."""
+    for sheet in book:
+        for line in sheet.iter_rows():
+            for cell in line:
+                if isinstance(cell.value, str) and cell.value.startswith("="):
+                    for written in (f"'{old}'!", f"{old}!"):
+                        cell.value = cell.value.replace(written, f"'{new}'!")
+    for defined in book.defined_names.values():
+        defined.attr_text = defined.attr_text.replace(f"'{old}'!", f"'{new}'!")
+    book[old].title = new
+    book.move_sheet(new, 3)

@@ -149,6 +149,20 @@ def test_a_sheet_whose_formulas_are_answers_holds_numbers_only(handout):
     assert not any(isinstance(value, str) for value in values)
 
 
+def test_formulas_that_repeat_an_answer_are_live_and_not_shown(handout):
+    """The velocities of the next step, on the goal line's sheet, are u and w one photo later."""
+    book = openpyxl.load_workbook(handout)
+    for sheet in book:
+        shown = {
+            cell.coordinate: cell.protection.hidden
+            for row in sheet.iter_rows(min_row=5)
+            for cell in row
+            if isinstance(cell.value, str) and "*SIGN(" in cell.value
+        }
+        assert all(shown.values())
+        assert bool(shown) == (sheet.title == "Goal line")
+
+
 def test_feedback_is_live_and_gives_no_number_away(handout, engine, tmp_path):
     """The words turn from "not yet" to "looks right", answer by answer."""
     paper = Paper(FOOTBALL, handout=handout.read_bytes()).open(tmp_path / "a.xlsx")

@@ -144,6 +144,9 @@ def handout_pages(exercise: Exercise, layout: Layout, now: Run) -> list[Page]:
             _empty(by_title[sheet], (FIRST_ROW + step, column))
     for section in exercise.frozen:
         _freeze(by_title[section])
+    for name in exercise.veiled:
+        sheet, column = layout.home(name)
+        _veil(by_title[sheet], column)
     _mend_read_me(by_title["Read me"])
     _mend_parameters(by_title["Parameters"])
     return pages
@@ -158,6 +161,13 @@ def _freeze(page: Page) -> None:
     for place, piece in page.pieces.items():
         if is_formula(piece.content):
             page.pieces[place] = piece._replace(content=piece.stored, kind="data", stored=None)
+
+
+def _veil(page: Page, at: int) -> None:
+    """Formulas stay, and are not shown while the sheet is locked."""
+    for place, piece in page.pieces.items():
+        if place[1] == at and is_formula(piece.content):
+            page.pieces[place] = piece._replace(kind="veiled")
 
 
 def _mend_parameters(page: Page) -> None:

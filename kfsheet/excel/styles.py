@@ -25,6 +25,7 @@ KINDS = {
     "formula": ("FFFFFF", "000000", False, 11),
     "index": ("F2F2F2", "595959", False, 11),
     "answer": ("FCE4D6", "000000", False, 11),
+    "veiled": ("FFFFFF", "000000", False, 11),  # a formula that a locked sheet does not show
     "sample": ("FCE4D6", "000000", False, 11),  # an answer in a legend: it stays locked
 }
 LEGEND = {
@@ -76,8 +77,7 @@ class Styles:
             wrap_text=wrap,
             indent=indent,
         )
-        if kind == "answer":
-            model.protection = Protection(locked=False)
+        model.protection = Protection(locked=kind != "answer", hidden=kind == "veiled")
         if number_format:
             model.number_format = number_format
         return model._style

@@ -398,5 +398,6 @@ exercise = Exercise(
         "b_z": (0.006, 0.02),
     },
     frozen=("Free run",),
+    veiled=("u_next", "w_next"),  # u and w of the next step
     draw=draw_kick,
 )
