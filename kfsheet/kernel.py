@@ -68,6 +68,7 @@ class _Printer(PythonPrinter):
     def __init__(self, source: _Source) -> None:
         super().__init__()
         self._source = source
+        self._branches = 0
 
     def _print_Indexed(self, expr: Indexed) -> str:
         return self._source.cell(str(expr.base.label), int(lag(expr)))
@@ -75,9 +76,19 @@ class _Printer(PythonPrinter):
     def _print_IndexedBase(self, expr: Expr) -> str:
         return self._source.whole(str(expr.label))
 
+    def _print_Piecewise(self, expr: Expr) -> str:
+        self._branches += 1
+        try:
+            return super()._print_Piecewise(expr)
+        finally:
+            self._branches -= 1
+
     def _print_Pow(self, expr: Expr) -> str:
-        whole = expr.exp.is_Integer or (-2 * expr.exp).is_Integer
-        return super()._print_Pow(expr) if whole else self._call("power", expr.base, expr.exp)
+        if expr.exp.is_Integer or (-2 * expr.exp).is_Integer:
+            return super()._print_Pow(expr)
+        text = self._call("power", expr.base, expr.exp)
+        # In a branch that is not taken it may have no value, so it stays there.
+        return text if self._branches else self._source.once(expr, text)
 
 
 class _Source:
@@ -92,13 +103,19 @@ class _Source:
         self.needed = needed(model, (*columns, *scalars))
         self.stored = self._stored()
         self.now = 0
+        self._once: dict[str, str] = {}
+        self._in_rows = False
         self._code = _Printer(self).doprint
 
     def kernel(self) -> Kernel:
         parameters = tuple(self.model.parameters)
         columns = self.model.table.values()
         data = tuple(c.name for c in columns if c.is_data and c.name in self.needed)
-        lines = [*self._head(data), *self._body(), *self._tail()]
+        head = self._head(data)
+        self._in_rows = True
+        body = list(self._body())
+        once = [f"        {name} = {text}" for text, name in self._once.items()]
+        lines = [*head, *once, *body, *self._tail()]
         source = "\n".join([PRELUDE, *lines, ""])
         return Kernel(source, parameters, data, tuple(self.stored), self.scalars)
 
@@ -111,6 +128,13 @@ class _Source:
         if self.level[name] < self.now:
             return f"kfsheet_out[{self.stored[name]}, {row}]"
         return f"kfsheet_{back}_{name}" if back else name
+
+    def once(self, expression: Expr, text: str) -> str:
+        """A costly value that is the same in every row is computed before the first one."""
+        fixed = {*self.model.parameters, *self.model.derived_scalars}
+        if not self._in_rows or {s.name for s in expression.free_symbols} - fixed:
+            return text
+        return self._once.setdefault(text, f"kfsheet_once_{len(self._once)}")
 
     def whole(self, name: str) -> str:
         """A column as an array, for an aggregate."""

@@ -162,7 +162,11 @@ class _Sums:
     @classmethod
     def of(cls, values: np.ndarray, scalars: np.ndarray) -> _Sums:
         """Sums over the first axis, values that are missing left out."""
-        there = ~np.isnan(values)
+        missing = np.isnan(values)
+        if not missing.any():
+            count = np.full(values.shape[1:], len(values))
+            return cls(count, values.sum(axis=0), (values * values).sum(axis=0), scalars)
+        there = ~missing
         filled = np.where(there, values, 0.0)
         return cls(there.sum(axis=0), filled.sum(axis=0), (filled**2).sum(axis=0), scalars)
 
