@@ -19,8 +19,9 @@ from kfsheet import (
     t,
     write_workbook,
 )
-from kfsheet.excel.compose import Run, is_formula
+from kfsheet.excel.compose import Run
 from kfsheet.excel.layout import FIRST_ROW, Layout
+from kfsheet.excel.page import is_formula
 from kfsheet.excel.recalculate import convert, open_in, recalculate
 from kfsheet.excel.workbook import compose, workbook_bytes
 from kfsheet.exercises import load_exercise
@@ -115,7 +116,7 @@ def test_a_formula_that_is_filled_down_is_stored_once_and_is_the_same_in_every_r
     path = write_workbook(other, tmp_path)
     book = openpyxl.load_workbook(path)
     for page in compose(other, layout, now, now):
-        for (row, column), piece in page.pieces.items():
+        for (row, column), piece in page.cells():
             if is_formula(piece.content):
                 assert book[page.title].cell(row, column).value == piece.content
     with zipfile.ZipFile(path) as archive:

@@ -14,8 +14,9 @@ from kfsheet.coursework.places import Places
 from kfsheet.coursework.submission import Book, Content, Formula
 from kfsheet.coursework.worlds import Own
 from kfsheet.errors import FormulaError
-from kfsheet.excel.compose import Piece, Run, is_formula, section_page
+from kfsheet.excel.compose import Run, section_page
 from kfsheet.excel.layout import Address, Layout
+from kfsheet.excel.page import Piece, is_formula
 from kfsheet.exercise import Exercise
 
 SAMPLE = 40  # rows of a long table that are looked at
@@ -92,7 +93,7 @@ def _original(exercise: Exercise) -> tuple[Interpreter, Places]:
         for page in (section_page(layout, section, now) for section in exercise.model.sections):
             book.sheets[page.title] = {
                 cell: Formula(piece.content, cell) if is_formula(piece.content) else _plain(piece)
-                for cell, piece in page.pieces.items()
+                for cell, piece in page.cells()
                 if piece.content is not None
             }
         book.sheets["Parameters"] = {}

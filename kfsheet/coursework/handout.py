@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from openpyxl.formatting.rule import CellIsRule
@@ -29,8 +30,9 @@ from kfsheet.coursework.variation import own_numbers
 from kfsheet.coursework.workers import Failed, Pool
 from kfsheet.coursework.worlds import Own
 from kfsheet.errors import ModelError, WorkbookError
-from kfsheet.excel.compose import Page, Piece, Run, is_formula
+from kfsheet.excel.compose import Run
 from kfsheet.excel.layout import FIRST_ROW, Layout
+from kfsheet.excel.page import Page, Piece, is_formula
 from kfsheet.excel.recalculate import Values, recalculate
 from kfsheet.excel.workbook import Shell, assemble, built_bytes, compose
 from kfsheet.exercise import Exercise
@@ -153,21 +155,19 @@ def handout_pages(exercise: Exercise, layout: Layout, now: Run) -> list[Page]:
 
 
 def _empty(page: Page, place: tuple[int, int]) -> None:
-    page.pieces[place] = Piece(None, "answer", format=page.pieces[place].format)
+    page.pieces[place] = Piece(None, "answer", format=page.at(*place).format)
 
 
 def _freeze(page: Page) -> None:
     """Numbers in the place of formulas that are those of an answer."""
-    for place, piece in page.pieces.items():
-        if is_formula(piece.content):
-            page.pieces[place] = piece._replace(content=piece.stored, kind="data", stored=None)
+    for at, filled in page.columns.items():
+        if filled.rules:
+            page.columns[at] = replace(filled, kind="data", rules=())
 
 
 def _veil(page: Page, at: int) -> None:
     """Formulas stay, and are not shown while the sheet is locked."""
-    for place, piece in page.pieces.items():
-        if place[1] == at and is_formula(piece.content):
-            page.pieces[place] = piece._replace(kind="veiled")
+    page.columns[at] = replace(page.columns[at], kind="veiled")
 
 
 def _mend_parameters(page: Page) -> None:
@@ -193,7 +193,7 @@ def _finish_book(book: Workbook, pages: list[Page], exercise: Exercise, token: s
     book[SHEET].conditional_formatting.add(area, rule)
     hide(book)
     for page in pages:
-        _protect(book[page.title], max(column for _, column in page.pieces))
+        _protect(book[page.title], page.width)
     book.active = book.sheetnames.index(SHEET)
 
 
@@ -229,5 +229,8 @@ def _store(pages: list[Page], values: Values) -> None:
         found = values[page.title]
         for place, piece in page.pieces.items():
             if is_formula(piece.content):
-                value = found.get(place)
-                page.pieces[place] = piece._replace(stored="" if value is None else value)
+                page.pieces[place] = piece._replace(stored=found.get(place, ""))
+        for at, filled in page.columns.items():
+            if filled.rules:
+                values = [found.get((row, at), "") for row in filled.rows]
+                page.columns[at] = replace(filled, values=values)

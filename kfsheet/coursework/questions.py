@@ -16,8 +16,9 @@ from openpyxl.workbook import Workbook
 
 from kfsheet.coursework import tokens
 from kfsheet.errors import ModelError
-from kfsheet.excel.compose import Page, Run
+from kfsheet.excel.compose import Run
 from kfsheet.excel.layout import FIRST_ROW, Layout, quote
+from kfsheet.excel.page import Page
 from kfsheet.exercise import Exercise, Question
 
 SHEET, HIDDEN = "Questions", "kfsheet"

@@ -11,103 +11,104 @@ to another worksheet is not shared; there a relative reference would not move.)
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from itertools import count
-from typing import NamedTuple
 from xml.sax.saxutils import escape
 
 from openpyxl.formula.translate import Translator
 from openpyxl.utils import get_column_letter
 
-from kfsheet.excel.compose import Page, Piece, is_formula
+from kfsheet.excel.page import Filled, Formula, Page, Piece, is_formula
 
 StyleOf = Callable[[str, str, str], int]
 """Number of a style, by kind, number format and alignment."""
 
 
-class _Fill(NamedTuple):
-    """Cells that share a formula: its number, and the first and last row of them."""
-
-    number: int
-    first: int
-    last: int
-
-
-_Fills = dict[tuple[int, int | None], _Fill]
-
-
 def sheet_data(page: Page, style_of: StyleOf) -> str:
     """The element ``sheetData`` of a page, stored values with the formulas."""
-    fills = _fills(page)
-    rows: dict[int, list[tuple[int, Piece]]] = {}
+    single: dict[int, dict[int, Piece]] = {}
     for (row, column), piece in page.pieces.items():
-        rows.setdefault(row, []).append((column, piece))
+        single.setdefault(row, {})[column] = piece
+    numbers = count()
+    columns = [
+        (at, _Column(page, at, filled, style_of(filled.kind, filled.format, ""), numbers))
+        for at, filled in sorted(page.columns.items())
+    ]
+    rows = {row for filled in page.columns.values() for row in filled.rows}
     parts = ["<sheetData>"]
-    for row in sorted({*rows, *page.heights}):
+    for row in sorted({*rows, *single, *page.heights}):
         height = page.heights.get(row)
         tall = f' ht="{height:g}" customHeight="1"' if height else ""
-        cells = "".join(
-            _cell(row, column, piece, style_of, fills.get((column, piece.rule)))
-            for column, piece in sorted(rows.get(row, ()), key=_column)
-        )
-        parts.append(f'<row r="{row}"{tall}>{cells}</row>')
+        own = single.get(row, {})
+        cells = {at: c.cell(row) for at, c in columns if row in c.rows and at not in own}
+        cells |= {at: _cell(row, at, piece, style_of) for at, piece in own.items()}
+        inside = "".join(cells[at] for at in sorted(cells))
+        parts.append(f'<row r="{row}"{tall}>{inside}</row>')
     parts.append("</sheetData>")
     return "".join(parts)
 
 
-def _column(cell: tuple[int, Piece]) -> int:
-    return cell[0]
+class _Column:
+    """Writes the cells of a column that is filled down."""
+
+    def __init__(
+        self, page: Page, at: int, filled: Filled, style: int, numbers: Iterator[int]
+    ) -> None:
+        self.rows, self._filled, self._letter = filled.rows, filled, _letter(at)
+        self._style = style
+        self._heads: dict[int, str] = {}
+        """First cell of each rule that is shared, by row, and what the other cells hold."""
+        self._shared: dict[int, str] = {}
+        for number, rule in enumerate(filled.rules):
+            last = filled.rows[-1] if number == len(filled.rules) - 1 else filled.first + number
+            rows = range(filled.first + number, last + 1)
+            rows = [row for row in rows if (row, at) not in page.pieces]
+            if rule and len(rows) > 1 and _moves(rule, self._letter, *rows[:2]):
+                si = next(numbers)
+                area = f"{self._letter}{rows[0]}:{self._letter}{rows[-1]}"
+                head = f'<f t="shared" ref="{area}" si="{si}">'
+                self._heads[rows[0]] = f"{head}{escape(rule(rows[0])[1:])}</f>"
+                self._shared[number] = f'<f t="shared" si="{si}"/>'
+
+    def cell(self, row: int) -> str:
+        """One cell."""
+        filled = self._filled
+        number = filled.number(row)
+        if not filled.rules or filled.rules[number] is None:
+            return _plain(f"{self._letter}{row}", self._style, filled.piece(row).content)
+        formula = self._heads.get(row) or self._shared.get(number)
+        kind, value = typed(filled.stored(row))
+        formula = formula or f"<f>{escape(filled.rules[number](row)[1:])}</f>"
+        return f'<c r="{self._letter}{row}" s="{self._style}"{kind}>{formula}<v>{value}</v></c>'
 
 
 _letter = lru_cache(maxsize=20_000)(get_column_letter)
 
 
-def _fills(page: Page) -> _Fills:
-    """Formulas that may be shared, by column and number of the rule."""
-    cells: dict[tuple[int, int | None], list[int]] = {}
-    for (row, column), piece in page.pieces.items():
-        if piece.rule is not None and is_formula(piece.content):
-            cells.setdefault((column, piece.rule), []).append(row)
-    numbers = count()
-    return {
-        (column, rule): _Fill(next(numbers), min(rows), max(rows))
-        for (column, rule), rows in cells.items()
-        if len(rows) > 1 and _moves(page, column, *sorted(rows)[:2])
-    }
-
-
-def _moves(page: Page, column: int, row: int, other: int) -> bool:
+def _moves(rule: Formula, letter: str, row: int, other: int) -> bool:
     """Whether the formula in ``other`` is the one in ``row``, filled down, on its own sheet."""
-    texts = page.pieces[row, column].content, page.pieces[other, column].content
-    places = f"{_letter(column)}{row}", f"{_letter(column)}{other}"
+    text = rule(row)
+    if "!" in text:
+        return False
+    return Translator(text, f"{letter}{row}").translate_formula(f"{letter}{other}") == rule(other)
+
+
+def _cell(row: int, column: int, piece: Piece, style_of: StyleOf) -> str:
+    address, style = f"{_letter(column)}{row}", style_of(piece.kind, piece.format, piece.align)
+    if not is_formula(piece.content):
+        return _plain(address, style, piece.content)
+    kind, value = typed(piece.stored)
     return (
-        "!" not in texts[0]
-        and Translator(texts[0], places[0]).translate_formula(places[1]) == (texts[1])
+        f'<c r="{address}" s="{style}"{kind}><f>{escape(piece.content[1:])}</f><v>{value}</v></c>'
     )
 
 
-def _formula(row: int, column: int, text: str, fill: _Fill | None) -> str:
-    if fill is None:
-        return f"<f>{escape(text[1:])}</f>"
-    if row != fill.first:
-        return f'<f t="shared" si="{fill.number}"/>'
-    letter = _letter(column)
-    area = f"{letter}{fill.first}:{letter}{fill.last}"
-    return f'<f t="shared" ref="{area}" si="{fill.number}">{escape(text[1:])}</f>'
-
-
-def _cell(row: int, column: int, piece: Piece, style_of: StyleOf, fill: _Fill | None) -> str:
-    content = piece.content
-    address = f"{_letter(column)}{row}"
-    head = f'<c r="{address}" s="{style_of(piece.kind, piece.format, piece.align)}"'
+def _plain(address: str, style: int, content: float | int | str | None) -> str:
+    head = f'<c r="{address}" s="{style}"'
     if content is None:
         return f"{head}/>"
     if isinstance(content, str):
-        if is_formula(content):
-            kind, value = typed(piece.stored)
-            formula = _formula(row, column, content, fill)
-            return f"{head}{kind}>{formula}<v>{value}</v></c>"
         kept = ' xml:space="preserve"' if content != content.strip() else ""
         return f'{head} t="inlineStr"><is><t{kept}>{escape(content)}</t></is></c>'
     kind, value = typed(content)

@@ -11,8 +11,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from math import isfinite, isnan, nan
 
-from kfsheet.excel.compose import Page, Run, number_format, stored
+from kfsheet.excel.compose import Run
 from kfsheet.excel.layout import Layout
+from kfsheet.excel.page import Page, stored
+from kfsheet.excel.styles import number_format
 from kfsheet.numerics import last, mean, rms, total
 from kfsheet.parts import Column
 

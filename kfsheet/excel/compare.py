@@ -26,15 +26,13 @@ from kfsheet import numerics
 from kfsheet.checks import walk
 from kfsheet.excel.checkpage import check_page
 from kfsheet.excel.compose import (
-    Page,
-    Piece,
     Run,
     charts_page,
-    is_formula,
     parameters_page,
     section_page,
 )
 from kfsheet.excel.layout import FIRST_ROW, Address, Layout
+from kfsheet.excel.page import Page, Piece, is_formula
 from kfsheet.excel.reading import Opened
 from kfsheet.excel.recalculate import Values
 from kfsheet.exercise import Exercise
@@ -56,7 +54,7 @@ class Comparison:
     def run(self, exercise: Exercise, now: Run, built: Run) -> None:
         """Compare every formula cell, then look for the culprits among those that differ."""
         for page in self._pages(exercise, now, built):
-            for (row, column), piece in page.pieces.items():
+            for (row, column), piece in page.cells():
                 self._compare((page.title, row, column), piece)
         homes = self._homes() if self.differing else {}
         blind = []

@@ -7,15 +7,15 @@ The same composition is what :mod:`kfsheet.excel.workbook` writes and what
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from math import isnan
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 from openpyxl.utils import get_column_letter
 
 from kfsheet.checks import columns_read
 from kfsheet.evaluation import run
 from kfsheet.excel.layout import FIRST_ROW, PARAMETER_ROW, Layout, chart_place, quote
+from kfsheet.excel.page import Filled, Page, Piece, stored
 from kfsheet.excel.styles import LEGEND, number_format
 from kfsheet.exercise import Exercise
 from kfsheet.expressions import Missing
@@ -25,45 +25,6 @@ from kfsheet.recurrence import Recurrence
 from kfsheet.units import pretty_unit
 
 NOT_AVAILABLE = "#N/A"
-TITLE_HEIGHT = 26
-
-
-class Piece(NamedTuple):
-    """One cell: its content (``=`` begins a formula), kind of style, value of the formula."""
-
-    content: Any
-    kind: str = "text"
-    stored: Any = None
-    format: str = ""
-    align: str = ""
-    scale: float = 0.0
-    """What a difference is measured against where the value itself is smaller."""
-    rule: int | None = None
-    """Cells of a column with the same number hold the same formula, filled down."""
-
-
-def is_formula(content: object) -> bool:
-    """Whether the content of a cell is a formula."""
-    return isinstance(content, str) and content.startswith("=")
-
-
-@dataclass
-class Page:
-    """One worksheet: pieces by (row, column), widths by column, and where it is frozen."""
-
-    title: str
-    pieces: dict[tuple[int, int], Piece] = field(default_factory=dict)
-    widths: dict[int, float] = field(default_factory=dict)
-    heights: dict[int, float] = field(default_factory=dict)
-    merges: list[str] = field(default_factory=list)
-    names: dict[str, tuple[int, int]] = field(default_factory=dict)
-    freeze: str = ""
-
-    def put(self, row: int, column: int, content: Any, kind: str = "text", **more: Any) -> None:
-        """Place one cell."""
-        if kind == "title":
-            self.heights[row] = TITLE_HEIGHT
-        self.pieces[row, column] = Piece(content, kind, **more)
 
 
 @dataclass(frozen=True)
@@ -85,11 +46,6 @@ class Run:
         return cls(columns, {**values, **scalars})
 
 
-def stored(value: float, kind: str = "") -> float | str:
-    """What a spreadsheet holds for a number that may be missing."""
-    return (kind if isnan(value) else value) if isinstance(value, float) else value
-
-
 def section_page(layout: Layout, section: str, now: Run) -> Page:
     """The worksheet of one section."""
     model, columns = layout.model, layout.columns[section]
@@ -97,8 +53,7 @@ def section_page(layout: Layout, section: str, now: Run) -> Page:
     page = Page(section, freeze=f"{get_column_letter(2 + len(clock))}{FIRST_ROW}")
     page.heights[3] = 48
     _head(page, columns["t"], step, "", f"number of the {step}", 8)
-    for row in range(model.rows):
-        page.put(FIRST_ROW + row, columns["t"], row, "index", format="0")
+    page.columns[columns["t"]] = Filled(FIRST_ROW, range(model.rows), "index", "0")
     for column in clock:
         _formula_column(page, layout, column, columns["time"], now)
     for column in model.sections[section]:
@@ -119,9 +74,7 @@ def _head(page: Page, at: int, symbol: str, unit: str, words: str, width: float 
 def _data_column(page: Page, column: Column, at: int, now: Run) -> None:
     _head(page, at, column.name, column.unit, column.description)
     values = now.columns[column.name]
-    shape = number_format(values)
-    for row, value in enumerate(values, FIRST_ROW):
-        page.put(row, at, None if isnan(value) else value, "data", format=shape)
+    page.columns[at] = Filled(FIRST_ROW, values, "data", number_format(values))
 
 
 def _formula_column(page: Page, layout: Layout, column: Column, at: int, now: Run) -> None:
@@ -131,15 +84,9 @@ def _formula_column(page: Page, layout: Layout, column: Column, at: int, now: Ru
     kind = "formula"
     if column is layout.model.clock:
         kind, shape = "index", "0.0##"
-    rules = [(rule, layout.formula(rule, page.title)) for rule in column.rules]
-    for row, value in enumerate(values):
-        number = min(row, len(column.start))
-        rule, text = rules[number]
-        # A start without a value is an empty cell, not a formula that says so.
-        content = None if rule is Missing else text(FIRST_ROW + row)
-        page.pieces[FIRST_ROW + row, at] = Piece(
-            content, kind, stored(value), shape, scale=size, rule=number
-        )
+    # A start without a value is an empty cell, not a formula that says so.
+    rules = tuple(None if r is Missing else layout.formula(r, page.title) for r in column.rules)
+    page.columns[at] = Filled(FIRST_ROW, values, kind, shape, size, rules)
 
 
 def parameters_page(layout: Layout, now: Run) -> Page:
@@ -212,15 +159,19 @@ def charts_page(exercise: Exercise, layout: Layout, now: Run) -> Page:
     for at, name in enumerate(names, PLOTTED_COLUMN):
         column = exercise.model.column(name)
         _head(page, at, name, column.unit, "plotted")
-        sheet, number = layout.home(name)
-        letter, values = get_column_letter(number), now.columns[name]
-        shape, size = number_format(values), rms(values)
-        for row, value in enumerate(values, FIRST_ROW):
-            cell = f"{quote(sheet)}!{letter}{row}"
-            text = f"=IF(ISNUMBER({cell}),{cell},NA())"
-            shown = stored(value, NOT_AVAILABLE)
-            page.put(row, at, text, "formula", stored=shown, format=shape, scale=size)
+        page.columns[at] = _plotted(layout, name, now.columns[name])
     return page
+
+
+def _plotted(layout: Layout, name: str, values: list[float]) -> Filled:
+    sheet, number = layout.home(name)
+    cells = f"{quote(sheet)}!{get_column_letter(number)}"
+
+    def rule(row: int) -> str:
+        return f"=IF(ISNUMBER({cells}{row}),{cells}{row},NA())"
+
+    shape, size = number_format(values), rms(values)
+    return Filled(FIRST_ROW, values, "formula", shape, size, (rule,), NOT_AVAILABLE)
 
 
 def chart_range(exercise: Exercise, layout: Layout, name: str) -> tuple[str, int]:

@@ -18,7 +18,6 @@ from kfsheet.errors import WorkbookError
 from kfsheet.excel.cells import sheet_data
 from kfsheet.excel.checkpage import FAIL, PASS, check_page
 from kfsheet.excel.compose import (
-    Page,
     Run,
     charts_page,
     parameters_page,
@@ -28,6 +27,7 @@ from kfsheet.excel.compose import (
 from kfsheet.excel.drawing import draw
 from kfsheet.excel.finish import finish, untouched
 from kfsheet.excel.layout import FIRST_ROW, Layout
+from kfsheet.excel.page import Page
 from kfsheet.excel.styles import Styles
 from kfsheet.exercise import Exercise
 from kfsheet.files import write_file
@@ -68,6 +68,8 @@ class Shell:
         for page in pages:
             for piece in page.pieces.values():
                 self._styles.number(piece.kind, piece.format, piece.align)
+            for filled in page.columns.values():
+                self._styles.number(filled.kind, filled.format, "")
         self._styles.close()
         saved = BytesIO()
         book.save(saved)
