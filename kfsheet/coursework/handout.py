@@ -232,5 +232,5 @@ def _store(pages: list[Page], values: Values) -> None:
                 page.pieces[place] = piece._replace(stored=found.get(place, ""))
         for at, filled in page.columns.items():
             if filled.rules:
-                values = [found.get((row, at), "") for row in filled.rows]
-                page.columns[at] = replace(filled, values=values)
+                kept = [found.get((row, at), "") for row in filled.rows]
+                page.columns[at] = replace(filled, values=kept)
