@@ -17,14 +17,9 @@ from sympy import Matrix, Symbol, diff, series, symbols
 from kfsheet import ModelError, Recurrence, add_filter, evaluate, t
 from kfsheet.drag import distorted, flight
 from kfsheet.evaluation import run
-from kfsheet.exercises.shuttlecock import (
-    DATA,
-    FORECASTS,
-    build_model,
-    joint_model,
-    shuttlecock,
-    track_fit,
-)
+from kfsheet.exercises.shuttlecock import DATA, FORECASTS, build_model, shuttlecock
+from kfsheet.shuttlecock.filters import joint_model
+from kfsheet.shuttlecock.forecasts import track_fit
 from tests.test_kalman import assert_close, assert_same_filter, joint_filter
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
