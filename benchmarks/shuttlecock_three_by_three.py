@@ -148,7 +148,7 @@ def timed() -> pd.Series:
         }
         for way, run in runs.items():
             run()  # compiles
-            best[way] = min(timeit.repeat(run, number=1, repeat=REPEATS))
+            best[way] = min(timeit.repeat(run, number=1, repeat=50 * REPEATS))
     return pd.Series(best) / STEPS * 1e6
 
 

@@ -84,6 +84,7 @@ def _parameters(m: Recurrence) -> None:
     m.parameter("q", 0.04, "m2", "Q of the filter, in m2, (m/s)2 and (m/s2)2", sign="nonnegative")
     m.parameter("s_q", 1, "s", "second that makes the units of Q fit", sign="positive")
     m.parameter("r_obs", 0.04, "m2", "R of the filter", sign="positive")
+    m.parameter("f_start", 1, "", "start, variance of a position, in units of R", sign="positive")
     m.parameter("var_v", 25, "m2/s2", "start, variance of a velocity", sign="positive")
     m.parameter("var_a", 25, "m2/s4", "start, variance of an acceleration", sign="positive")
     m.parameter("Phi_s", 0, "m2/s3", "exact filter, spectral density", sign="nonnegative")

@@ -43,7 +43,7 @@ def joint_model(m: Recurrence, axes: str = "xyz") -> StateSpace:
     for axis in axes:
         words = AXES[axis]
         p, v, a = (Symbol(f"{letter}{axis}", real=True) for letter in ("", "v", "a"))
-        state[p] = State("m", words, m[f"{axis}_obs"][t], r_obs)
+        state[p] = State("m", words, m[f"{axis}_obs"][t], m["f_start"] * r_obs)
         state[v] = State("m/s", f"velocity {WAYS[axis]}", 0, m["var_v"])
         state[a] = State("m/s2", f"acceleration {WAYS[axis]}", 0, m["var_a"])
         v_new = v + a * dt
