@@ -157,8 +157,9 @@ ABOUT = (
     "'Fit filtered' as the filter of the sheet Kalman corrected them. The filter's positions are "
     "indeed better than the cameras'. Are its fall points?",
     "Try this on the sheet Parameters: set e_k to 1 (filters and fits now believe in twice the "
-    "drag) or k_2 to 0.2 (quadratic drag in the truth), and Phi_s to 0.5. Or type 15 over one of "
-    "the green draws on the sheet Camera, an outlier, and set gate to 3. When does a filter win?",
+    "drag) or k_2 to 0.2 (quadratic drag in the truth); then let the exact filter doubt: set Phi_s "
+    "to 0.05 or 0.5. Or type 15 over one of the green draws on the sheet Camera, an outlier, and "
+    "set gate to 3. When does a filter win?",
     "Everything is live. The filter's state has nine elements, but covariances between the axes "
     "stay 0, so they have no columns and it is three filters of three. The drag k_m is an "
     "assumption: the source gives none.",
@@ -196,9 +197,7 @@ def _error_chart(title: str, runs: dict[str, str], note: str) -> Chart:
 
 
 CHARTS = (
-    _axis_chart(
-        "x", "19 of 20 of the cameras' positions lie in the band; the filter's scatter less."
-    ),
+    _axis_chart("x", "19 of 20 camera positions lie in the band; the filter's scatter less."),
     _axis_chart("y", "The noise is in proportion to the signal on each axis."),
     _axis_chart("z", "The shuttlecock falls just after the last frame."),
     Chart(
@@ -215,12 +214,12 @@ CHARTS = (
     _error_chart(
         "The fall point, from fits",
         {"raw": "first", "kf": "second"},
-        "Does filtering first help the fit? One flight does not tell: the notebook flies 400.",
+        "Does filtering first help the fit? One flight does not tell; the notebook flies 400.",
     ),
     _error_chart(
         "The fall point, from latest states",
         {"raw": "first", "now": "free", "ex": "second line"},
-        "The exact filter is the fit, frame by frame; the three-state filter forgets.",
+        "The exact filter soon is the fit, frame by frame; the three-state filter forgets.",
     ),
 )
 QUESTIONS = (
