@@ -787,8 +787,8 @@ pd.DataFrame(lost).map("{:.0%}".format)
 #    frame 2 it errs by 0.74 m (the paper's) and 0.88 m (the exact one), the fit by 1.07 m. **That
 #    its model may be wrong**, if it is wrong enough: with twice the drag a filter that doubts ends
 #    at 0.049 or 0.047 m, the fit at 0.058 m. **That a frame may be wrong**: with a narrow
-#    gate it typically ends at 0.048 m, the fit at 0.086 m, but one flight in nine is lost by metres;
-#    a wide gate wins less (0.058 m) and loses fewer.
+#    gate it typically ends at 0.048 m, the fit at 0.086 m, but one flight in nine is lost, by
+#    metres; a wide gate wins less (0.058 m) and loses fewer.
 # 4. None of this is the filter as such. Without doubt, prior and gate it is the fit. And doubt has
 #    a price: where drag is 30 % too small or quadratic, the fit bends its other parameters, and
 #    $\Phi_s$ = 0.5 in the end only costs; $\Phi_s$ = 0.05 is nearly free.

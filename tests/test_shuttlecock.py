@@ -180,8 +180,8 @@ def test_three_filters_and_the_joint_one_fly_the_same_flight(frame):
     """The benchmark's two programs, with inverses, against each other and against the sheet."""
     positions = frame[OBSERVED].to_numpy()
     assert disagreement(positions) < 1e-12
-    (states, P), _ = flown(positions)
-    assert_same_filter(frame, NAMES, states, P, None)
+    for states, P in flown(positions):
+        assert_same_filter(frame, NAMES, states, P, nine_by_nine(frame)[2])
 
 
 def test_compiled_loops_compute_what_they_are_timed_for():
