@@ -1,4 +1,4 @@
-"""Linear drag as the shuttlecock's source prints it, and the fall in its sheet; see also test_fitting."""
+"""Linear drag as the shuttlecock's source prints it, and the fall in its sheet."""
 
 import numpy as np
 import pytest

@@ -11,6 +11,7 @@ import pytest
 from numpy.polynomial import polynomial
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from scipy.stats import binom
 from sympy import Matrix, Symbol, diff, series, symbols
 
 from kfsheet import ModelError, Recurrence, add_filter, evaluate, t
@@ -67,11 +68,6 @@ def integrated(time, k_2=0.0):
     return path.y[:3].T, path.t_events[0][0], path.y_events[0][0][:2]
 
 
-def draws(seed):
-    noise = np.random.RandomState(seed).standard_normal((N, 3))
-    return {"n_x": noise[:, 0], "n_y": noise[:, 1], "n_z": noise[:, 2]}
-
-
 def rms(values, axis=None):
     return np.sqrt(np.mean(np.square(values), axis=axis))
 
@@ -116,6 +112,15 @@ def test_snr_25_and_r_004_are_one_statement(frame):
         assert variance < 0.04
 
 
+def test_the_band_of_the_cameras_holds_19_of_20_frames(frame):
+    seen, truth = frame[OBSERVED].to_numpy(), track(TIME)
+    half = 2 * rms(truth, axis=0) / 5
+    np.testing.assert_allclose(frame[["x_low", "y_low", "z_low"]], truth - half, atol=1e-13)
+    np.testing.assert_allclose(frame[["x_high", "y_high", "z_high"]], truth + half, atol=1e-13)
+    outside = (np.abs(seen - truth) > half).sum()
+    assert binom.ppf(0.001, 81, 0.0455) <= outside <= binom.ppf(0.999, 81, 0.0455)
+
+
 def frame_draws(axis):
     return pd.read_csv(DATA / "shuttlecock_draws.csv")[f"n_{axis}"]
 
@@ -157,6 +162,31 @@ def test_the_joint_filter_falls_apart_by_itself(frame):
     found = evaluate(alone)
     for column in ("z_a", "vz_a", "az_a", "P_zvz_a", "K_az_z", "d_z"):
         assert (found[f"{column}_alone"][1:] == frame[column][1:]).all()
+
+
+def test_a_first_position_that_counts_twice_is_a_start_with_half_the_variance():
+    """f_start = 1/2 against a filter that starts at the first position and then assimilates it."""
+    f = evaluate(shuttlecock, f_start=0.5)
+    ys = f[OBSERVED].to_numpy()
+    x, P = np.array([ys[0, 2], 0, 0]), np.diag([0.04, 25, 25])
+    A, fall = np.array([[1, T, T**2 / 2], [0, 1, T], [0, -K, -K * T]]), np.array([0, 0, -G])
+    H, R = np.array([[1.0, 0, 0]]), np.array([[0.04]])
+    S = H @ P @ H.T + R
+    P = P - P @ H.T @ H @ P / S
+    found = joint_filter(
+        lambda x: A @ x + fall,
+        lambda x: A,
+        lambda x: H @ x,
+        lambda x: H,
+        0.04 * np.eye(3),
+        R,
+        x,
+        P,
+        ys[1:, 2:],
+    )
+    for i, name in enumerate(["z_a", "vz_a", "az_a"]):
+        assert_close(f[name], found[0][:, i])
+    assert_close(f["P_zz_a"], found[1][:, 0, 0])
 
 
 @pytest.mark.parametrize("axes", ["", "w", "xyw"])

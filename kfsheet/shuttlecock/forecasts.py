@@ -183,5 +183,4 @@ def add_theory(m: Recurrence, page: str) -> None:
     error = sqrt(spread * (m["var_x"] + m["var_y"] + m["var_z"] * (v / vz) ** 2))
     (expected,) = m.columns("e_theory", section=page)
     words = "theory: rms error of the fall point of this fit"
-    rule = Piecewise((error, vz < 0), (Missing, True))  # a flight that only touches z_fall has none
-    m.define(expected[t], rule, "m", words, start=[Missing])
+    m.define(expected[t], error, "m", words, start=[Missing])
