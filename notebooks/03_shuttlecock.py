@@ -195,7 +195,8 @@ from shuttlecock_three_by_three import counted, flown
 
 run = kf.evaluate(shuttlecock)
 three, nine = flown(run[["x_obs", "y_obs", "z_obs"]].to_numpy())
-print([float(abs(a - b).max().round(12)) for a, b in zip(three, nine, strict=True)])
+for what, a, b in zip(("states", "covariances"), three, nine, strict=True):
+    print(f"{what} of three filters and of one differ by {abs(a - b).max():.12f} at most")
 
 # %%
 NAMES = [f"{letter}{axis}_a" for axis in "xyz" for letter in ("", "v", "a")]
@@ -222,7 +223,7 @@ print(Path("../benchmarks/shuttlecock_three_by_three.txt").read_text().split("\n
 # %% [markdown]
 # In NumPy a call costs more than its arithmetic: three small filters, one after the other, take
 # almost three times *longer* than the large one. Compiled loops pay for the arithmetic, and there
-# the paper is right: half the time, though not a ninth.
+# the paper is right: less than half the time, though not a ninth.
 #
 # ## The noise
 #
@@ -565,10 +566,10 @@ found = np.sqrt((flights["e_fall_raw"][:, AFTER] ** 2).mean(axis=0))
 pd.DataFrame({"theory (m)": run["e_theory"][AFTER], "400 flights (m)": found}).round(3)
 
 # %% [markdown]
-# They do, once the errors are small. The filtered positions are sums of raw ones, so a
-# fit to them is another linear estimate: it can be better only by what the filter was told
-# beforehand. All is linear, so impulses show the weight that each frame gets in the height forecast
-# for the moment of the fall.
+# They do, once the errors are small. The filtered positions are sums of raw ones, so a fit to them
+# is another linear estimate: it can be better only by what the filter was told beforehand. All is
+# linear, so impulses show the weight that each frame gets in the height forecast for the moment of
+# the fall.
 
 # %%
 silence = {name: np.zeros(27) for name in ("n_x", "n_y", "n_z")}
@@ -695,11 +696,11 @@ axes[0].set_ylabel("median error, exact filter / raw fit")
 _ = axes[0].legend(frameon=False)
 
 # %% [markdown]
-# **Without doubt** the filter ties with the fit from frame 10 on, in every world: it is the fit,
-# and as blind to a wrong model. It leads in the first frames, by up to a fifth. **A little doubt**
-# costs next to nothing, and wins the last frames where the drag is twice too large, by 15 %. **Much
-# doubt** wins there from frame 14 on, but in all other worlds it ends with a quarter to a third
-# more error than the fit.
+# **Without doubt** the filter ties with the fit from frame 10 on, within two percent, in every
+# world: it is the fit, and as blind to a wrong model. It leads in the first frames, by up to a
+# fifth. **A little doubt** costs some percent at most, and wins the last frames where the drag is
+# twice too large, by 15 %. **Much doubt** wins there from frame 18 on, but in all other worlds it
+# ends with a quarter to a third more error than the fit.
 #
 # In how many of the flights does the filter win? 45 to 55 % is chance.
 
@@ -714,8 +715,8 @@ pd.DataFrame({(w, D): share(f) for w, runs in worlds.items() for D, f in runs.it
 
 # %% [markdown]
 # Shares tell who wins, not by how much. With twice the drag the filter without doubt loses more
-# than nine flights in ten from frame 10 on, by one percent: the velocity 0 that it started from
-# pulls its forecasts the wrong way. Where the drag is taken too small, it pulls the right way.
+# than nine flights in ten from frame 10 on, by one or two percent: the velocity 0 that it started
+# from pulls its forecasts the wrong way. Where the drag is taken too small, it pulls the right way.
 #
 # ### When a frame is wrong: the filter, and its gate
 #
