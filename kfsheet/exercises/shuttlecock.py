@@ -250,4 +250,5 @@ exercise = Exercise(
     sections=SECTIONS,
     vary={"v_x": (1.2, 1.8), "v_y": (0.6, 1.0), "v_z": (3.7, 4.2), "k_m": (0.85, 1.15)},
     noise=("n_x", "n_y", "n_z"),
+    frozen=("Truth", "Fit filtered", "Latest state", "Exact filter"),
 )
