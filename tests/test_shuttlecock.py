@@ -18,7 +18,7 @@ from kfsheet import ModelError, Recurrence, add_filter, evaluate, t
 from kfsheet.drag import distorted, flight
 from kfsheet.exercises.shuttlecock import DATA, build_model, shuttlecock
 from kfsheet.shuttlecock.filters import joint_model
-from kfsheet.shuttlecock.forecasts import track_fit
+from kfsheet.shuttlecock.forecasts import add_fit, add_latest, track_fit
 from tests.test_kalman import assert_close, assert_same_filter, joint_filter
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
@@ -295,6 +295,14 @@ def test_running_sums_are_a_fit_to_all_frames_so_far(frame, name, seen):
         p, v = polynomial.polyfit(X[: last + 1], y[: last + 1], 1)
         assert_close(frame.loc[last, [f"p_{axis}_{name}" for axis in "xyz"]], p, 1e-8)
         assert_close(frame.loc[last, [f"v_{axis}_{name}" for axis in "xyz"]], v, 1e-8)
+
+
+def test_a_forecast_from_what_is_not_there_is_refused():
+    m = build_model()
+    with pytest.raises(ModelError, match="x_smoothed"):
+        add_fit(m, "Fit", "s", "fit to nothing", "smoothed")
+    with pytest.raises(ModelError, match="x_a_s"):
+        add_latest(m, "Latest", "s", "no filter", "_s")
 
 
 def test_without_noise_every_fit_is_the_truth():

@@ -88,7 +88,22 @@ def _add_error(m: Recurrence, page: str, run: str, words: str, start: Sequence[E
 
 
 def add_latest(m: Recurrence, page: str, run: str, words: str, suffix: str = "") -> None:
-    """The fall point from the analysis of a filter, whose columns end in ``suffix``, alone."""
+    """The fall point from the latest analysis of a filter alone, without any fit.
+
+    Parameters
+    ----------
+    m : Recurrence
+        It has the columns of the filter: ``x_a``, ``vx_a``, ... and the ending.
+    page, run, words : str
+        The worksheet, the ending of the new names, and who forecasts.
+    suffix : str
+        The ending of the filter's columns.
+
+    Raises
+    ------
+    ModelError
+        If the filter is not there.
+    """
     p = [m[f"{axis}_a{suffix}"][t] for axis in AXES]
     v = [m[f"v{axis}_a{suffix}"][t] for axis in AXES]
     add_landing(m, page, run, words, p, v, k=m["k_fit"], since=m["time"][t])
@@ -134,6 +149,11 @@ def add_fit(m: Recurrence, page: str, run: str, words: str, positions: str) -> N
         The worksheet, the ending of the names, and what the fit is called.
     positions : str
         The ending of the columns to fit: ``"obs"`` for ``x_obs, y_obs, z_obs``.
+
+    Raises
+    ------
+    ModelError
+        If there are no such columns, or the regressors are missing.
     """
     solution, sums = track_fit()
     found: dict[str, list[Expr]] = {"p": [], "v": []}
