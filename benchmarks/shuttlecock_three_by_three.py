@@ -3,20 +3,24 @@
     python benchmarks/shuttlecock_three_by_three.py
 
 Arithmetic operations of one step, equations (10) to (14), are counted by SymPy in matrices without
-a single 0; the time of one step is NumPy's, best of several, with calls on three matrices one after
-the other, on three at once (stacked), and on the nine-state matrix.
+a single 0. The time of one step is the best of several: NumPy's, with calls on three matrices one
+after the other, on three at once (stacked), and on the nine-state matrix; and, where Numba is
+installed, that of compiled loops, which pay for operations rather than for calls. What it printed
+last is kept in ``shuttlecock_three_by_three.txt`` beside it.
 """
 
 from __future__ import annotations
 
-import itertools
 import timeit
+from collections.abc import Callable
+from importlib.util import find_spec
 
 import numpy as np
 import pandas as pd
 from sympy import Matrix, MatrixSymbol, count_ops
 
 STEPS, REPEATS = 2000, 7
+T, K, G = 1 / 30, 1.0, 9.80665
 
 
 def full(name: str, rows: int, columns: int) -> Matrix:
@@ -63,45 +67,147 @@ def counted() -> pd.DataFrame:
     return table.astype({"three 3 x 3": int, "one 9 x 9": int})
 
 
-def step(x, P, A, H, Q, R, y):  # noqa: ANN001, ANN201 - arrays, stacked or not
+def step(x, P, A, u, H, Q, R, y):  # noqa: ANN001, ANN201 - arrays, stacked or not
     """One step of the filter, equations (10) to (14)."""
-    x, P = A @ x, A @ P @ A.mT + Q
+    x, P = A @ x + u, A @ P @ A.mT + Q
     PH = P @ H.mT
     K = PH @ np.linalg.inv(H @ PH + R)
     return x + K @ (y - H @ x), P - K @ H @ P
 
 
-def problems() -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """The arrays of three filters, stacked along a first axis, and of the joint one."""
-    T, I3 = 1 / 30, np.eye(3)
-    A = np.array([[1, T, T**2 / 2], [0, 1, T], [0, -1, -T]])
-    H, one = np.array([[1.0, 0, 0]]), np.ones((1, 1))
-    small = [np.ones((3, 1)), np.diag([0.04, 25, 25]), A, H, 0.04 * I3, 0.04 * one, one]
-    joint = [np.vstack([small[0]] * 3), *(np.kron(I3, part) for part in small[1:-1])]
-    return [np.stack([part] * 3) for part in small], [*joint, np.ones((3, 1))]
+Problem = tuple[np.ndarray, ...]
+"""x, P at the start, and A, u, H, Q, R."""
+
+
+def problems(first: np.ndarray) -> tuple[Problem, Problem]:
+    """Three filters stacked along a first axis, and the joint one, started at a first position."""
+    I3 = np.eye(3)
+    x = np.kron(first, [1.0, 0, 0]).reshape(3, 3, 1)
+    u = np.zeros((3, 3, 1))
+    u[2, 2] = -G
+    A = np.array([[1, T, T**2 / 2], [0, 1, T], [0, -K, -K * T]])
+    one = [np.diag([0.04, 25, 25]), A, np.array([[1.0, 0, 0]]), 0.04 * I3, 0.04 * np.ones((1, 1))]
+    P, A, H, Q, R = (np.stack([part] * 3) for part in one)
+    P_9, A_9, H_9, Q_9, R_9 = (np.kron(I3, part) for part in one)
+    three, nine = (x, P, A, u, H, Q, R), (x, P_9, A_9, u, H_9, Q_9, R_9)
+    return three, tuple(part.reshape(9, 1) if part.shape == (3, 3, 1) else part for part in nine)
+
+
+def flown(positions: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """A whole flight by both filters, from positions of shape (frames, 3) that were seen.
+
+    Returns
+    -------
+    three, nine : list
+        The states, shape (frames, 9), and the covariances, (frames, 9, 9), of three small filters
+        and of the joint one, which start in frame 0 at the position seen there.
+    """
+    three, nine = problems(positions[0])
+    results = []
+    for (x, P, *model), shape in ((three, (3, 1, 1)), (nine, (3, 1))):
+        states, covariances = [x], [P]
+        for seen in positions[1:]:
+            x, P = step(x, P, *model, seen.reshape(shape))
+            states.append(x)
+            covariances.append(P)
+        results.append([np.reshape(states, (-1, 9)), np.array(covariances)])
+    results[0][1] = _blocks(results[0][1])
+    return results[0], results[1]
+
+
+def _blocks(P: np.ndarray) -> np.ndarray:
+    """Covariances (frames, 3, 3, 3) of three filters as blocks of (frames, 9, 9)."""
+    whole = np.zeros((len(P), 9, 9))
+    for n in range(3):
+        whole[:, 3 * n : 3 * n + 3, 3 * n : 3 * n + 3] = P[:, n]
+    return whole
+
+
+def disagreement(positions: np.ndarray) -> float:
+    """Largest difference between both filters in a flight, of any state or covariance."""
+    three, nine = flown(positions)
+    return max(float(np.abs(a - b).max()) for a, b in zip(three, nine, strict=True))
 
 
 def timed() -> pd.Series:
     """Microseconds of one step, by way of computing."""
-    stacked, joint = problems()
-    single = [[part[n] for part in stacked] for n in range(3)]
-    ways = {
-        "three 3 x 3, one after the other": lambda: [step(*parts) for parts in single],
-        "three 3 x 3, stacked": lambda: step(*stacked),
-        "one 9 x 9": lambda: step(*joint),
+    stacked, joint = problems(np.zeros(3))
+    seen, seen_9 = np.ones((3, 1, 1)), np.ones((3, 1))
+    single = [[*(part[n] for part in stacked), seen[n]] for n in range(3)]
+    ways: dict[str, Callable] = {
+        "NumPy: three 3 x 3, one after the other": lambda: [step(*parts) for parts in single],
+        "NumPy: three 3 x 3, stacked": lambda: step(*stacked, seen),
+        "NumPy: one 9 x 9": lambda: step(*joint, seen_9),
     }
     best = {w: min(timeit.repeat(run, number=STEPS, repeat=REPEATS)) for w, run in ways.items()}
+    if find_spec("numba"):
+        loops = compiled_steps()
+        runs = {
+            "compiled loops: three 3 x 3": lambda: [loops(*parts, STEPS) for parts in single],
+            "compiled loops: one 9 x 9": lambda: loops(*joint, seen_9, STEPS),
+        }
+        for way, run in runs.items():
+            run()  # compiles
+            best[way] = min(timeit.repeat(run, number=1, repeat=50 * REPEATS))
     return pd.Series(best) / STEPS * 1e6
 
 
-def disagreement() -> float:
-    """Largest difference between the two filters after a step; they are one filter."""
-    stacked, joint = problems()
-    (x, P), (x_9, P_9) = step(*stacked), step(*joint)
-    blocks = np.zeros((9, 9))
-    for n, (i, j) in itertools.product(range(3), itertools.product(range(3), repeat=2)):
-        blocks[3 * n + i, 3 * n + j] = P[n, i, j]
-    return max(np.abs(x.reshape(9, 1) - x_9).max(), np.abs(blocks - P_9).max())
+def compiled_steps() -> Callable:
+    """Many times the same :func:`step`, in loops that Numba compiles; needs Numba.
+
+    Every intermediate matrix has its place before the first step, as in a program for a robot.
+    """
+    from numba import njit
+
+    @njit
+    def times(a, b, out):  # noqa: ANN001
+        for i in range(a.shape[0]):
+            for j in range(b.shape[1]):
+                out[i, j] = 0
+                for k in range(a.shape[1]):
+                    out[i, j] += a[i, k] * b[k, j]
+
+    @njit
+    def invert(S, out):  # noqa: ANN001 - Gauss and Jordan; S is positive definite, and lost
+        n = S.shape[0]
+        for i, j in np.ndindex(n, n):
+            out[i, j] = i == j
+        for i in range(n):
+            pivot = S[i, i]
+            for k in range(n):
+                S[i, k] /= pivot
+                out[i, k] /= pivot
+            for j in range(n):
+                factor = S[j, i]
+                for k in range(n if j != i else 0):
+                    S[j, k] -= factor * S[i, k]
+                    out[j, k] -= factor * out[i, k]
+
+    @njit
+    def steps(x, P, A, u, H, Q, R, y, number):  # noqa: ANN001
+        x, P, x_f, AP, P_f, KH = x.copy(), P.copy(), x.copy(), P.copy(), P.copy(), P.copy()
+        PH, K, S, V, d = H.T.copy(), H.T.copy(), R.copy(), R.copy(), y.copy()
+        for _ in range(number):
+            times(A, x, x_f)
+            x_f += u
+            times(A, P, AP)
+            times(AP, A.T, P_f)
+            P_f += Q
+            times(P_f, H.T, PH)
+            times(H, PH, S)
+            S += R
+            invert(S, V)
+            times(PH, V, K)
+            times(H, x_f, d)
+            np.subtract(y, d, d)
+            times(K, d, x)
+            x += x_f
+            times(K, H, KH)
+            times(KH, P_f, P)
+            np.subtract(P_f, P, P)
+        return x, P
+
+    return steps
 
 
 def main() -> None:
@@ -110,7 +216,8 @@ def main() -> None:
     print(counted().to_string())
     print(f"\nTime of one step (NumPy {np.__version__}, best of {REPEATS} times {STEPS})\n")
     print(timed().map("{:.1f} us".format).to_string())
-    print(f"\nLargest difference of the results: {disagreement():.0e}")
+    positions = np.random.RandomState(1).standard_normal((27, 3))
+    print(f"\nLargest difference of the results in 27 frames: {disagreement(positions):.0e}")
 
 
 if __name__ == "__main__":

@@ -11,24 +11,26 @@ import pytest
 from numpy.polynomial import polynomial
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from scipy.stats import binom, chi2
+from scipy.stats import binom
 from sympy import Matrix, Symbol, diff, series, symbols
 
 from kfsheet import ModelError, Recurrence, add_filter, evaluate, t
 from kfsheet.drag import distorted, flight
-from kfsheet.evaluation import run
-from kfsheet.exercises.shuttlecock import (
-    DATA,
-    FORECASTS,
-    build_model,
-    joint_model,
-    shuttlecock,
-    track_fit,
-)
+from kfsheet.exercises.shuttlecock import DATA, build_model, shuttlecock
+from kfsheet.shuttlecock.filters import joint_model
+from kfsheet.shuttlecock.forecasts import add_fit, add_latest, track_fit
 from tests.test_kalman import assert_close, assert_same_filter, joint_filter
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
-from shuttlecock_three_by_three import counted, disagreement, operations
+from shuttlecock_three_by_three import (
+    compiled_steps,
+    counted,
+    disagreement,
+    flown,
+    operations,
+    problems,
+    step,
+)
 
 T, K, G, N = 1 / 30, 1.0, 9.80665, 27
 P_0, V_0 = np.array([0, 0, 0.5]), np.array([1.5, 0.8, 4.0])
@@ -64,11 +66,6 @@ def integrated(time, k_2=0.0):
     start, exact = [*P_0, *V_0], {"rtol": 1e-10, "atol": 1e-12}
     path = solve_ivp(rate, (0, 2), start, t_eval=time, events=ground, **exact)
     return path.y[:3].T, path.t_events[0][0], path.y_events[0][0][:2]
-
-
-def draws(seed):
-    noise = np.random.RandomState(seed).standard_normal((N, 3))
-    return {"n_x": noise[:, 0], "n_y": noise[:, 1], "n_z": noise[:, 2]}
 
 
 def rms(values, axis=None):
@@ -115,6 +112,15 @@ def test_snr_25_and_r_004_are_one_statement(frame):
         assert variance < 0.04
 
 
+def test_the_band_of_the_cameras_holds_19_of_20_frames(frame):
+    seen, truth = frame[OBSERVED].to_numpy(), track(TIME)
+    half = 2 * rms(truth, axis=0) / 5
+    np.testing.assert_allclose(frame[["x_low", "y_low", "z_low"]], truth - half, atol=1e-13)
+    np.testing.assert_allclose(frame[["x_high", "y_high", "z_high"]], truth + half, atol=1e-13)
+    outside = (np.abs(seen - truth) > half).sum()
+    assert binom.ppf(0.001, 81, 0.0455) <= outside <= binom.ppf(0.999, 81, 0.0455)
+
+
 def frame_draws(axis):
     return pd.read_csv(DATA / "shuttlecock_draws.csv")[f"n_{axis}"]
 
@@ -158,6 +164,31 @@ def test_the_joint_filter_falls_apart_by_itself(frame):
         assert (found[f"{column}_alone"][1:] == frame[column][1:]).all()
 
 
+def test_a_first_position_that_counts_twice_is_a_start_with_half_the_variance():
+    """f_start = 1/2 against a filter that starts at the first position and then assimilates it."""
+    f = evaluate(shuttlecock, f_start=0.5)
+    ys = f[OBSERVED].to_numpy()
+    x, P = np.array([ys[0, 2], 0, 0]), np.diag([0.04, 25, 25])
+    A, fall = np.array([[1, T, T**2 / 2], [0, 1, T], [0, -K, -K * T]]), np.array([0, 0, -G])
+    H, R = np.array([[1.0, 0, 0]]), np.array([[0.04]])
+    S = H @ P @ H.T + R
+    P = P - P @ H.T @ H @ P / S
+    found = joint_filter(
+        lambda x: A @ x + fall,
+        lambda x: A,
+        lambda x: H @ x,
+        lambda x: H,
+        0.04 * np.eye(3),
+        R,
+        x,
+        P,
+        ys[1:, 2:],
+    )
+    for i, name in enumerate(["z_a", "vz_a", "az_a"]):
+        assert_close(f[name], found[0][:, i])
+    assert_close(f["P_zz_a"], found[1][:, 0, 0])
+
+
 @pytest.mark.parametrize("axes", ["", "w", "xyw"])
 def test_an_axis_that_does_not_exist_is_refused(axes):
     with pytest.raises(ModelError, match="give some of x, y, z"):
@@ -171,9 +202,27 @@ def test_operations_are_counted_as_by_hand():
     assert operations(3, 1)["its covariance, (11)"] == 2 * product + 9
 
 
-def test_nine_by_nine_costs_nine_times_as_much_and_gives_the_same():
+def test_nine_by_nine_costs_nine_times_as_much():
     assert counted().loc["one step", "ratio"] == pytest.approx(9, abs=0.5)
-    assert disagreement() < 1e-12
+
+
+def test_three_filters_and_the_joint_one_fly_the_same_flight(frame):
+    """The benchmark's two programs, with inverses, against each other and against the sheet."""
+    positions = frame[OBSERVED].to_numpy()
+    assert disagreement(positions) < 1e-12
+    for states, P in flown(positions):
+        assert_same_filter(frame, NAMES, states, P, nine_by_nine(frame)[2])
+
+
+def test_compiled_loops_compute_what_they_are_timed_for():
+    pytest.importorskip("numba")
+    seen = np.array([[0.3], [-0.2], [0.9]])
+    _, (x, P, *model) = problems(np.array([0.1, 0, 0.5]))
+    found = compiled_steps()(x, P, *model, seen, 4)
+    for _ in range(4):
+        x, P = step(x, P, *model, seen)
+    np.testing.assert_allclose(found[0], x, atol=1e-13)
+    np.testing.assert_allclose(found[1], P, atol=1e-13)
 
 
 def test_the_third_row_makes_the_acceleration_a_function_of_the_velocity(frame):
@@ -246,6 +295,14 @@ def test_running_sums_are_a_fit_to_all_frames_so_far(frame, name, seen):
         p, v = polynomial.polyfit(X[: last + 1], y[: last + 1], 1)
         assert_close(frame.loc[last, [f"p_{axis}_{name}" for axis in "xyz"]], p, 1e-8)
         assert_close(frame.loc[last, [f"v_{axis}_{name}" for axis in "xyz"]], v, 1e-8)
+
+
+def test_a_forecast_from_what_is_not_there_is_refused():
+    m = build_model()
+    with pytest.raises(ModelError, match="x_smoothed"):
+        add_fit(m, "Fit", "s", "fit to nothing", "smoothed")
+    with pytest.raises(ModelError, match="x_a_s"):
+        add_latest(m, "Latest", "s", "no filter", "_s")
 
 
 def test_without_noise_every_fit_is_the_truth():
@@ -325,112 +382,6 @@ def test_the_gate_treats_an_outlier_as_a_missing_frame():
         assert_close(f[f"{name}_a_ex"], x[:, i])
     assert_close(f["P_xx_a_ex"], P[:, 0, 0])
     assert (f.loc[f["K_x_x_ex"] == 0].index == [12]).all()
-
-
-# -- many flights: what the source claims --------------------------------------------------------
-
-RUNS = 200
-AFTER = [6, 10, 14, 18, 22, 26]
-
-
-def fly(data=draws, **parameters):
-    """Errors of fall points, runs x frames, of each forecast; and those of positions."""
-    columns = [run(shuttlecock, data(seed), parameters)[0] for seed in range(RUNS)]
-    names = [
-        *(f"e_fall_{r}" for r in FORECASTS),
-        *(f"e_{a}_{r}" for a in "xyz" for r in ("obs", "a")),
-    ]
-    return {name: np.array([c[name] for c in columns]) for name in names}
-
-
-def outliers(seed):
-    """One frame of ten, on average, errs by 8 standard deviations more, on every axis."""
-    state = np.random.RandomState(10_000 + seed)
-    hit = state.random_sample(N) < 0.1
-    return {name: n + 8 * hit * state.standard_normal(N) for name, n in draws(seed).items()}
-
-
-@pytest.fixture(scope="module")
-def flights():
-    return {
-        "sound": fly(),
-        "twice the drag": fly(e_k=1, Phi_s=0.5),
-        "quadratic": fly(k_2=0.1),
-        "outliers": fly(outliers, gate=3),
-    }
-
-
-def middle(errors, frames=AFTER):
-    return np.median(errors[:, frames], axis=0)
-
-
-def test_claim_1_holds_positions_are_better_filtered(flights):
-    """Over 400 runs a reference gave 0.111, 0.060, 0.172 m and 0.079, 0.043, 0.125 m."""
-    for axis, raw, filtered in (("x", 0.111, 0.079), ("y", 0.060, 0.043), ("z", 0.172, 0.125)):
-        assert rms(flights["sound"][f"e_{axis}_obs"]) == pytest.approx(raw, rel=0.03)
-        assert rms(flights["sound"][f"e_{axis}_a"]) == pytest.approx(filtered, rel=0.05)
-
-
-def test_claim_2_does_not_hold_fall_points_are_no_better_from_filtered_positions(flights):
-    """The reference's medians; those of 200 runs scatter by 4 % themselves, as its own do."""
-    raw, kf = middle(flights["sound"]["e_fall_raw"]), middle(flights["sound"]["e_fall_kf"])
-    np.testing.assert_allclose(raw, [0.366, 0.164, 0.092, 0.068, 0.045, 0.035], rtol=0.2)
-    np.testing.assert_allclose(kf, [0.381, 0.177, 0.094, 0.069, 0.046, 0.036], rtol=0.2)
-    assert (kf > raw).all()
-    pairs = flights["sound"]["e_fall_kf"][:, AFTER] < flights["sound"]["e_fall_raw"][:, AFTER]
-    assert (pairs.sum(axis=0) < binom.ppf(0.999, RUNS, 0.5)).all()
-
-
-def test_the_fit_to_raw_positions_errs_as_theory_says(flights):
-    """Gauss and Markov: variance of the fall point from that of the fit, to first order."""
-    X = (1 - np.exp(-TIME)) / K
-    sigma = rms(track(TIME), axis=0) / 5
-    end = brentq(lambda s: track(s)[2], 0.5, 2)
-    X_end, falling = 1 - np.exp(-end), (V_0[2] + G) * np.exp(-end) - G
-    for last in (18, 22, 26):
-        design = np.column_stack([np.ones(last + 1), X[: last + 1]])
-        spread = np.array([1, X_end]) @ np.linalg.inv(design.T @ design) @ np.array([1, X_end])
-        late = spread * sigma[2] ** 2 / falling**2  # variance of the time of the fall
-        drift = V_0[:2] * np.exp(-end)
-        expected = spread * (sigma[:2] ** 2).sum() + late * (drift**2).sum()
-        found = np.mean(flights["sound"]["e_fall_raw"][:, last] ** 2)
-        assert found == pytest.approx(expected, rel=4 * np.sqrt(2 / RUNS))
-
-
-def test_a_filter_wins_while_there_are_few_frames(flights):
-    """It knows that velocities are of some metres per second; a line through three points not."""
-    sound = flights["sound"]
-    assert middle(sound["e_fall_ex"], [2]) < 0.9 * middle(sound["e_fall_raw"], [2])
-    assert middle(sound["e_fall_now"], [2]) < 0.8 * middle(sound["e_fall_raw"], [2])
-
-
-def test_the_latest_state_of_the_three_state_filter_forgets(flights):
-    sound = flights["sound"]
-    assert middle(sound["e_fall_now"], [26]) > 1.5 * middle(sound["e_fall_raw"], [26])
-
-
-def test_a_filter_wins_against_outliers_because_it_can_refuse_them(flights):
-    wild = flights["outliers"]
-    later = AFTER[2:]
-    assert (middle(wild["e_fall_ex"], later) < 0.75 * middle(wild["e_fall_raw"], later)).all()
-    assert (middle(wild["e_fall_kf"]) > 0.95 * middle(wild["e_fall_raw"])).all()
-
-
-def test_a_filter_that_doubts_its_model_wins_if_the_model_is_wrong_enough(flights):
-    twice = flights["twice the drag"]
-    assert middle(twice["e_fall_ex"], [26]) < 0.85 * middle(twice["e_fall_raw"], [26])
-    quadratic = flights["quadratic"]
-    ratio = middle(quadratic["e_fall_ex"]) / middle(quadratic["e_fall_raw"])
-    assert np.abs(ratio - 1).max() < 0.1
-
-
-def test_r_004_makes_the_filter_modest():
-    """NIS far below 3: R claims more noise than there is; the exact filter claims what there is."""
-    found = [run(shuttlecock, draws(seed))[1] for seed in range(40)]
-    low, high = chi2.interval(0.999, 3 * 26 * 40)
-    exact = np.mean([s["mean_NIS_ex"] for s in found]) * 26 * 40
-    assert low < exact < high
-    assert np.mean([s["mean_NIS"] for s in found]) < 1.5
 
 
 def test_the_sums_of_the_fit_are_those_of_the_normal_equations():

@@ -9,27 +9,27 @@ latest state.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import pairwise
 from pathlib import Path
 
-from sympy import Expr, Matrix, Max, Piecewise, Symbol, diag, exp, sqrt, symbols
+from sympy import Matrix, sqrt
 
-from kfsheet.algebra import discrete_noise
 from kfsheet.charts import Chart, Series
-from kfsheet.drag import distorted, fall_argument, fall_asymptote, flight, lambert_step
-from kfsheet.errors import ModelError
+from kfsheet.drag import distorted, flight
 from kfsheet.exercise import Exercise, Question
-from kfsheet.expressions import RMS, Last, Mean, Missing, t, when_observed
-from kfsheet.fitting import least_squares
-from kfsheet.kalman import Observation, State, StateSpace, add_filter
+from kfsheet.expressions import RMS, Last, Mean, t
+from kfsheet.kalman import add_filter
 from kfsheet.recurrence import Recurrence
+from kfsheet.shuttlecock.filters import AXES, WAYS, exact_model, joint_model
+from kfsheet.shuttlecock.forecasts import (
+    add_fit,
+    add_landing,
+    add_latest,
+    add_regressors,
+    add_theory,
+)
 from kfsheet.tables import Table, read_table
 
 DATA = Path(__file__).parent / "data"
-AXES = {"x": "distance ahead", "y": "distance sideways", "z": "height"}
-WAYS = {"x": "ahead", "y": "sideways", "z": "upwards"}  # of velocities and accelerations
-NEWTON_STEPS = 8  # enough for weak drag; with the source's numbers five are
 FORECASTS = {
     "raw": "fit to the cameras",
     "kf": "fit to the filter",
@@ -55,13 +55,15 @@ def build_model(draws: str | Path = DATA / "shuttlecock_draws.csv") -> Recurrenc
     m = Recurrence("shuttlecock", title="The fall point of a shuttlecock", step="frame")
     _parameters(m)
     _truth(m)
-    _cameras(m, noise)
+    _camera(m, noise)
     add_filter(m, joint_model(m), section="Kalman")
-    _fit(m, "Fit raw", "raw", "obs")
-    _fit(m, "Fit filtered", "kf", "a")
-    _latest(m, "Latest state", "now", "")
+    add_regressors(m, "Fit raw")
+    add_fit(m, "Fit raw", "raw", FORECASTS["raw"], "obs")
+    add_theory(m, "Fit raw")
+    add_fit(m, "Fit filtered", "kf", FORECASTS["kf"], "a")
+    add_latest(m, "Latest state", "now", FORECASTS["now"])
     add_filter(m, exact_model(m), section="Exact filter", suffix="_ex")
-    _latest(m, "Exact filter", "ex", "_ex")
+    add_latest(m, "Exact filter", "ex", FORECASTS["ex"], "_ex")
     _errors(m)
     return m
 
@@ -82,6 +84,7 @@ def _parameters(m: Recurrence) -> None:
     m.parameter("q", 0.04, "m2", "Q of the filter, in m2, (m/s)2 and (m/s2)2", sign="nonnegative")
     m.parameter("s_q", 1, "s", "second that makes the units of Q fit", sign="positive")
     m.parameter("r_obs", 0.04, "m2", "R of the filter", sign="positive")
+    m.parameter("f_start", 1, "", "start, variance of a position, in units of R", sign="positive")
     m.parameter("var_v", 25, "m2/s2", "start, variance of a velocity", sign="positive")
     m.parameter("var_a", 25, "m2/s4", "start, variance of an acceleration", sign="positive")
     m.parameter("Phi_s", 0, "m2/s3", "exact filter, spectral density", sign="nonnegative")
@@ -90,62 +93,6 @@ def _parameters(m: Recurrence) -> None:
     k_fit = m.derived("k_fit", k_m + e_k, "1/s", "drag over mass that filters and fits assume")
     m.derived("X_dt", distorted(k_fit, dt), "s", "distorted time between two frames")
     m.time(t * dt, "s", "time since the first frame")
-
-
-# -- when and where it falls --------------------------------------------------------------------
-
-
-def _landing(
-    m: Recurrence,
-    page: str,
-    run: str,
-    p: Sequence[Expr],
-    v: Sequence[Expr],
-    *,
-    k: Expr,
-    since: Expr,
-    start: Sequence[Expr] = (),
-) -> None:
-    """When and where a flight from position p with velocity v at the time ``since`` ends."""
-    words, at_least = FORECASTS.get(run, "truth"), -exp(-1)
-    steps = [f"W_{n}" for n in range(1, NEWTON_STEPS + 1)]
-    names = ["c", "w", *steps, "t_fall", "x_fall", "y_fall"]
-    m.columns(*(f"{name}_{run}" for name in names), section=page)
-
-    def put(name: str, rule: Expr, unit: str, what: str, read: str = "") -> Expr:
-        cell = m[f"{name}_{run}"][t]
-        if read and run != "true":
-            rule = when_observed(m[f"{read}_{run}"][t], rule)
-        m.define(cell, rule, unit, f"{words}: {what}", start=start)
-        return cell
-
-    c = fall_asymptote(k, m["g"], p[2] - m["z_fall"], v[2])
-    c = put("c", c, "", "when the asymptote of the flight ends, times k")
-    w = fall_argument(k, m["g"], v[2], c)
-    # The truth must have an end: where it stays below z_fall, its highest point.
-    w = put("w", Max(w, at_least) if run == "true" else w, "", "argument of Lambert's W")
-    first = lambert_step(0, w)
-    if run != "true":
-        first = Piecewise((first, w >= at_least), (Missing, True))
-    W = put("W_1", first, "", "W(w), first step of Newton's method")
-    for before, name in pairwise(steps):
-        W = put(name, lambert_step(W, w), "", f"W(w), step {name[2:]}", before)
-    end = put("t_fall", since + (c + W) / k, "s", "time of the fall", steps[-1])
-    for n, axis in enumerate(("x", "y")):
-        place = p[n] + v[n] * distorted(k, end - since)
-        put(f"{axis}_fall", place, "m", f"fall point, {AXES[axis]}", "t_fall")
-
-
-def _landing_error(m: Recurrence, page: str, run: str, start: Sequence[Expr] = ()) -> None:
-    (e,) = m.columns(f"e_fall_{run}", section=page)
-    ahead, aside = m[f"x_fall_{run}"][t], m[f"y_fall_{run}"][t]
-    error = sqrt((ahead - m["x_fall"]) ** 2 + (aside - m["y_fall"]) ** 2)
-    words = f"{FORECASTS[run]}: distance from the true fall point"
-    m.define(e[t], when_observed((ahead, aside), error), "m", words, start=start)
-    m.summary(f"last_{run}", Last(e), "m", f"{words}, last frame")
-
-
-# -- truth and cameras ---------------------------------------------------------------------------
 
 
 def _truth(m: Recurrence) -> None:
@@ -166,139 +113,25 @@ def _truth(m: Recurrence) -> None:
         what = f"truth, velocity {WAYS[axis]}"
         m.define(v[t], moved[1], "m/s", what, start=[m[f"v_{axis}"]])
     here, fast = [p[t] for p in position], [v[t] for v in velocity]
-    _landing(m, page, "true", here, fast, k=k_eff[t], since=m["time"][t])
+    now = {"k": k_eff[t], "since": m["time"][t]}
+    add_landing(m, page, "true", "truth", here, fast, **now, certain=True)
     for name, unit, what in (("t", "s", "time"), ("x", "m", AXES["x"]), ("y", "m", AXES["y"])):
         m.summary(f"{name}_fall", Last(m[f"{name}_fall_true"]), unit, f"truth, fall: {what}")
 
 
-def _cameras(m: Recurrence, noise: Table) -> None:
-    page = "Cameras"
+def _camera(m: Recurrence, noise: Table) -> None:
+    page = "Camera"
     for axis, words in AXES.items():
         n, true = f"n_{axis}", m[f"{axis}_true"]
         draw = m.data(n, noise[n], "", "standard-normal draw", section=page)
         variance = m.summary(
             f"var_{axis}", RMS(true) ** 2 / m["SNR"], "m2", f"variance of the noise, {words}"
         )
-        (seen,) = m.columns(f"{axis}_obs", section=page)
+        seen, low, high = m.columns(f"{axis}_obs", f"{axis}_low", f"{axis}_high", section=page)
         m.define(seen[t], true[t] + sqrt(variance) * draw[t], "m", f"seen by the cameras, {words}")
-
-
-# -- filters -------------------------------------------------------------------------------------
-
-
-def joint_model(m: Recurrence, axes: str = "xyz") -> StateSpace:
-    """The source's filter, equations (9) to (14): position, velocity, acceleration of each axis.
-
-    The acceleration is that of linear drag at the new velocity, and gravity enters there alone.
-
-    Parameters
-    ----------
-    m : Recurrence
-        It has the parameters, and the positions that the cameras saw.
-    axes : str
-        Some of "xyz": three states for each.
-
-    Raises
-    ------
-    ModelError
-        If an axis is none of x, y and z.
-    """
-    if not axes or set(axes) - set(AXES):
-        raise ModelError(f"the axes are {axes!r}; give some of {', '.join(AXES)}")
-    dt, k, g, q, s_q, r_obs = m["dt", "k_fit", "g", "q", "s_q", "r_obs"]
-    state, transition, seen = {}, [], []
-    for axis in axes:
-        words = AXES[axis]
-        p, v, a = (Symbol(f"{letter}{axis}", real=True) for letter in ("", "v", "a"))
-        state[p] = State("m", words, m[f"{axis}_obs"][t], r_obs)
-        state[v] = State("m/s", f"velocity {WAYS[axis]}", 0, m["var_v"])
-        state[a] = State("m/s2", f"acceleration {WAYS[axis]}", 0, m["var_a"])
-        v_new = v + a * dt
-        a_new = -k * v_new - (g if axis == "z" else 0)
-        transition += [p + v * dt + a * dt**2 / 2, v_new, a_new.expand()]
-        seen.append(Observation(axis, m[f"{axis}_obs"][t], p, r_obs, "m"))
-    Q = diag(*[q, q / s_q**2, q / s_q**4] * len(axes))
-    return StateSpace(state, transition, Q, seen)
-
-
-def exact_model(m: Recurrence) -> StateSpace:
-    """Position and velocity alone, with the exact transition and the variance of the noise."""
-    dt, k, X = m["dt", "k_fit", "X_dt"]
-    state, transition, seen = {}, [], []
-    for axis, words in AXES.items():
-        p, v = (Symbol(f"{letter}{axis}", real=True) for letter in ("", "v"))
-        variance = m[f"var_{axis}"]
-        state[p] = State("m", words, m[f"{axis}_obs"][t], variance)
-        state[v] = State("m/s", f"velocity {WAYS[axis]}", 0, m["var_v"])
-        g = m["g"] if axis == "z" else 0
-        transition += list(flight(k, g, dt, X) * Matrix([p, v, 1]))
-        seen.append(Observation(axis, m[f"{axis}_obs"][t], p, variance, "m", gate=m["gate"]))
-    Q = discrete_noise(Matrix([[0, 1], [0, 0]]), diag(0, m["Phi_s"]), dt)
-    return StateSpace(state, transition, diag(Q, Q, Q), seen)
-
-
-# -- fits and forecasts --------------------------------------------------------------------------
-
-
-def track_fit() -> tuple[dict[str, Expr], dict[str, Symbol]]:
-    """Position and velocity at the start by least squares, equations (7) and (8).
-
-    Returns
-    -------
-    solution, sums : dict
-        ``p`` and ``v`` as formulas of the sums ``n, X, XX, y, Xy``; the symbols of these sums.
-    """
-    p, v, X, y = symbols("p v X y", real=True)
-    sums = dict(zip("n X XX y Xy".split(), symbols("n S_X S_XX S_y S_Xy", real=True), strict=True))
-    monomials = dict(zip((1, X, X**2, y, X * y), sums.values(), strict=True))
-    solution = least_squares(p + v * X, [p, v], y, monomials)
-    return {"p": solution[p], "v": solution[v]}, sums
-
-
-def _fit(m: Recurrence, page: str, run: str, positions: str) -> None:
-    """The fit to the positions of the frames 0..t, from running sums, and its fall point."""
-    if run == "raw":
-        _regressors(m, page)
-    solution, sums = track_fit()
-    found: dict[str, list[Expr]] = {"p": [], "v": []}
-    for axis, words in AXES.items():
-        y = m[f"{axis}_{positions}"][t] - (m["drop"][t] if axis == "z" else 0)
-        S_y = _running_sum(m, page, f"sum_{axis}_{run}", y, "m", f"sum of {words}, without gravity")
-        S_Xy = _running_sum(
-            m, page, f"sum_X{axis}_{run}", m["X"][t] * y, "m s", f"sum of X times {words}"
-        )
-        cells = (t + 1, m["sum_X"][t], m["sum_XX"][t], S_y, S_Xy)
-        at = dict(zip(sums.values(), cells, strict=True))
-        for letter, unit, what in (("p", "m", words), ("v", "m/s", f"velocity {WAYS[axis]}")):
-            (column,) = m.columns(f"{letter}_{axis}_{run}", section=page)
-            rule = solution[letter].xreplace(at)
-            m.define(column[t], rule, unit, f"{FORECASTS[run]}: start, {what}", start=[Missing])
-            found[letter].append(column[t])
-    _landing(m, page, run, found["p"], found["v"], k=m["k_fit"], since=0, start=[Missing])
-    _landing_error(m, page, run, start=[Missing])
-
-
-def _regressors(m: Recurrence, page: str) -> None:
-    k, g, time = m["k_fit"], m["g"], m["time"][t]
-    X, drop = m.columns("X", "drop", section=page)
-    m.define(X[t], distorted(k, time), "s", "distorted time, in which the track is linear")
-    m.define(drop[t], flight(k, g, time, X[t])[0, 2], "m", "what gravity alone does to the height")
-    _running_sum(m, page, "sum_X", X[t], "s", "sum of X")
-    _running_sum(m, page, "sum_XX", X[t] ** 2, "s2", "sum of the squares of X")
-
-
-def _running_sum(m: Recurrence, page: str, name: str, term: Expr, unit: str, words: str) -> Expr:
-    (total,) = m.columns(name, section=page)
-    m.define(total[t], total[t - 1] + term, unit, words, start=[term])
-    return total[t]
-
-
-def _latest(m: Recurrence, page: str, run: str, suffix: str) -> None:
-    """The fall point from a filter's analysis alone."""
-    p = [m[f"{axis}_a{suffix}"][t] for axis in AXES]
-    v = [m[f"v{axis}_a{suffix}"][t] for axis in AXES]
-    _landing(m, page, run, p, v, k=m["k_fit"], since=m["time"][t])
-    _landing_error(m, page, run)
+        band = "19 of 20 frames lie between: truth"
+        m.define(low[t], true[t] - 2 * sqrt(variance), "m", f"{band} - 2 sigma")
+        m.define(high[t], true[t] + 2 * sqrt(variance), "m", f"{band} + 2 sigma")
 
 
 def _errors(m: Recurrence) -> None:
@@ -324,15 +157,16 @@ ABOUT = (
     "'Fit filtered' as the filter of the sheet Kalman corrected them. The filter's positions are "
     "indeed better than the cameras'. Are its fall points?",
     "Try this on the sheet Parameters: set e_k to 1 (filters and fits now believe in twice the "
-    "drag) or k_2 to 0.2 (quadratic drag in the truth), and Phi_s to 0.5. Or type 15 over one of "
-    "the green draws on the sheet Cameras, an outlier, and set gate to 3. When does a filter win?",
+    "drag) or k_2 to 0.2 (quadratic drag in the truth); then let the exact filter doubt: set Phi_s "
+    "to 0.05 or 0.5. Or type 15 over one of the green draws on the sheet Camera, an outlier, and "
+    "set gate to 3. When does a filter win?",
     "Everything is live. The filter's state has nine elements, but covariances between the axes "
     "stay 0, so they have no columns and it is three filters of three. The drag k_m is an "
     "assumption: the source gives none.",
 )
 SECTIONS = {
     "Truth": "the flight, in exact steps of linear drag, and its fall point",
-    "Cameras": "truth plus noise from fixed draws; its variance is the signal's power over SNR",
+    "Camera": "truth plus noise from fixed draws; its variance is the signal's power over SNR",
     "Kalman": "the source's filter: position, velocity and acceleration of three axes",
     "Fit raw": "least squares on the positions seen so far, and the fall point (names end in _raw)",
     "Fit filtered": "the same on the filter's positions (names end in _kf)",
@@ -344,6 +178,8 @@ SECTIONS = {
 
 def _axis_chart(axis: str, note: str) -> Chart:
     series = (
+        Series("time", f"{axis}_low", "", "bound"),
+        Series("time", f"{axis}_high", "truth ± 2 sigma", "bound"),
         Series("time", f"{axis}_true", "truth", "truth"),
         Series("time", f"{axis}_obs", "cameras", "observation"),
         Series("time", f"{axis}_a", "filter", "analysis"),
@@ -354,11 +190,14 @@ def _axis_chart(axis: str, note: str) -> Chart:
 
 def _error_chart(title: str, runs: dict[str, str], note: str) -> Chart:
     series = tuple(Series("time", f"e_fall_{run}", FORECASTS[run], runs[run]) for run in runs)
-    return Chart(title, "time of the frame (s)", "error of the fall point (m)", series, note=note)
+    theory = Series("time", "e_theory", "theory of the fit, rms", "bound")
+    words = "time of the frame (s)", "error of the fall point (m)"
+    # Two frames make a fit that may err by many metres; the rest would be a flat line.
+    return Chart(title, *words, (theory, *series), note=note, y_limits=(0, 1.5))
 
 
 CHARTS = (
-    _axis_chart("x", "The filter's positions scatter less than the cameras'."),
+    _axis_chart("x", "19 of 20 camera positions lie in the band; the filter's scatter less."),
     _axis_chart("y", "The noise is in proportion to the signal on each axis."),
     _axis_chart("z", "The shuttlecock falls just after the last frame."),
     Chart(
@@ -375,12 +214,12 @@ CHARTS = (
     _error_chart(
         "The fall point, from fits",
         {"raw": "first", "kf": "second"},
-        "Does filtering first help the fit? One flight does not tell: the notebook flies 400.",
+        "Does filtering first help the fit? One flight does not tell; the notebook flies 400.",
     ),
     _error_chart(
         "The fall point, from latest states",
         {"raw": "first", "now": "free", "ex": "second line"},
-        "The exact filter is the fit, frame by frame; the three-state filter forgets.",
+        "The exact filter soon is the fit, frame by frame; the three-state filter forgets.",
     ),
 )
 QUESTIONS = (
@@ -411,4 +250,5 @@ exercise = Exercise(
     sections=SECTIONS,
     vary={"v_x": (1.2, 1.8), "v_y": (0.6, 1.0), "v_z": (3.7, 4.2), "k_m": (0.85, 1.15)},
     noise=("n_x", "n_y", "n_z"),
+    frozen=("Truth", "Fit filtered", "Latest state", "Exact filter"),
 )
