@@ -41,8 +41,8 @@ class Definition(NamedTuple):
 class FilterCells:
     """What a filter's columns are called, which of them there are, and how they are defined.
 
-    A covariance that is 0 for ever has no column: what does not depend on each other falls apart
-    into filters of its own.
+    A covariance that is 0 for ever, and a gain that is, have no columns: what does not depend on
+    each other falls apart into filters of its own.
     """
 
     def __init__(self, m: Recurrence, model: StateSpace, suffix: str) -> None:

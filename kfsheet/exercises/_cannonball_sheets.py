@@ -16,8 +16,9 @@ ABOUT = (
     "lower (angle = 35) and look at the Charts. Then set Phi_s to 10: the filters now distrust "
     "their model, never rest, and follow the noise. mean_NIS tells whether a filter errs as much "
     "as it says: two observations, so 2 is expected.",
-    "Everything is live. Rows after the landing are grey and leave the statistics. An elevation "
-    "above 45 degrees flies longer than the table; make dt larger.",
+    "Everything is live. Rows after the landing are grey and leave the statistics. A ball shot at "
+    "more than 45 degrees is still in the air in the last row: landed, the first of the results, "
+    "is then 0 and red, and the statistics cover only a part of the flight. Make dt larger.",
 )
 SECTIONS = {
     "Truth": "the flight without errors, stepped as the source steps it",
@@ -28,65 +29,111 @@ SECTIONS = {
 }
 
 
-def _residuals(
+NAMES = {"a": ("EKF", "line", "bound"), "lin": ("linear filter", "second line", "second band")}
+
+
+def _claimed(run: str, name: str) -> tuple[Series, ...]:
+    """An error or innovation, within the band that its filter claims."""
+    label, role, band = NAMES[run]
+    return (
+        Series("time", name, label if name.startswith("e") else f"innovation {name}", role),
+        Series("time", f"{name}_low", "", band),
+        Series("time", f"{name}_high", "2 sigma band" + " (linear)" * (run == "lin"), band),
+    )
+
+
+def _over_time(
     title: str,
     label: str,
-    name: str,
-    raw: str = "",
-    note: str = "",
+    series: tuple[Series, ...],
+    note: str,
     limits: tuple[float, float] | None = None,
 ) -> Chart:
-    band = (
-        Series("time", f"{name}_low", "", "bound"),
-        Series("time", f"{name}_high", "2 sigma band", "bound"),
-    )
-    cloud = (Series("time", raw, "radar alone", "cloud"),) if raw else ()
-    line = Series("time", name, "EKF" if name.startswith("e") else f"innovation {name}", "line")
-    return Chart(title, "time (s)", label, (*cloud, line, *band), note=note, y_limits=limits)
+    return Chart(title, "time (s)", label, series, note=note, y_limits=limits)
 
 
+def _cloud(name: str) -> tuple[Series]:
+    return (Series("time", f"e_{name}_obs", "radar alone", "cloud"),)
+
+
+FLIGHT = (
+    Series("x_obs", "y_obs", "radar", "cloud"),
+    Series("x_true", "y_true", "truth", "truth"),
+    Series("x_a", "y_a", "EKF", "line"),
+)
 CHARTS = (
     Chart(
         "The flight",
         "x: distance (m)",
         "y: height (m)",
-        (
-            Series("x_obs", "y_obs", "radar", "cloud"),
-            Series("x_true", "y_true", "truth", "truth"),
-            Series("x_a", "y_a", "EKF", "line"),
-        ),
+        FLIGHT,
         note="Radar positions scatter by 500 m and more; the filter lies on the path.",
     ),
-    _residuals(
+    _over_time(
+        "Is the filter honest?",
+        "NIS",
+        (Series("time", "NIS", "NIS", "cloud"),),
+        "Normalised innovations squared: 2 in the mean, above 6 in one sweep of 20.",
+        (0, 16),
+    ),
+    _over_time(
         "Range",
         "observed - forecast (m)",
-        "d_r",
-        note="Innovations of r: 19 of 20 within the band. The first ones are outside the picture.",
-        limits=(-150, 150),
+        _claimed("a", "d_r"),
+        "Innovations of r: 19 of 20 within the band. The first ones are outside the picture.",
+        (-150, 150),
     ),
-    _residuals("Angle", "observed - forecast (rad)", "d_theta", note="Innovations of theta."),
-    _residuals(
-        "Distance", "error of x (m)", "e_x_a", "e_x_obs", "Errors: radar alone, and the EKF's."
+    _over_time(
+        "Angle",
+        "observed - forecast (rad)",
+        _claimed("a", "d_theta"),
+        "Innovations of theta.",
     ),
-    _residuals("Height", "error of y (m)", "e_y_a", "e_y_obs", "The same for the height."),
-    _residuals(
+    _over_time(
+        "Distance",
+        "error of x (m)",
+        _cloud("x") + _claimed("a", "e_x_a"),
+        "Errors: radar alone, and the EKF's.",
+    ),
+    _over_time(
+        "Height",
+        "error of y (m)",
+        _cloud("y") + _claimed("a", "e_y_a"),
+        "The same for the height.",
+    ),
+    _over_time(
         "Distance, close up",
         "error of x (m)",
-        "e_x_a",
-        note="The band is what the EKF claims.",
-        limits=(-60, 60),
+        _claimed("a", "e_x_a"),
+        "The band is what the EKF claims.",
+        (-60, 60),
     ),
-    _residuals("Height, close up", "error of y (m)", "e_y_a", note="The same.", limits=(-100, 100)),
-    Chart(
-        "Extended or linear?",
-        "time (s)",
+    _over_time(
+        "Height, close up", "error of y (m)", _claimed("a", "e_y_a"), "The same.", (-100, 100)
+    ),
+    _over_time(
+        "Horizontal velocity",
+        "error of vx (m/s)",
+        _claimed("a", "e_vx_a"),
+        "No sensor measures a velocity; the filter infers it.",
+        (-4, 4),
+    ),
+    _over_time(
+        "Vertical velocity", "error of vy (m/s)", _claimed("a", "e_vy_a"), "The same.", (-10, 10)
+    ),
+    _over_time(
+        "Distance, extended or linear?",
+        "error of x (m)",
+        _claimed("lin", "e_x_lin") + _claimed("a", "e_x_a")[:1],
+        "The same radar, two filters; the band is what the linear one claims.",
+        (-60, 60),
+    ),
+    _over_time(
+        "Height, extended or linear?",
         "error of y (m)",
-        (
-            Series("time", "e_y_lin", "linear filter", "second line"),
-            Series("time", "e_y_a", "EKF", "line"),
-        ),
-        note="The same radar, two filters.",
-        y_limits=(-200, 200),
+        _claimed("lin", "e_y_lin") + _claimed("a", "e_y_a")[:1],
+        "The same for the height.",
+        (-100, 100),
     ),
 )
 QUESTIONS = (

@@ -15,7 +15,7 @@ from sympy import Expr, Matrix, Piecewise, Symbol, atan2, cos, diag, pi, sin, sq
 from kfsheet.algebra import discrete_noise, transition_matrix
 from kfsheet.exercise import Exercise
 from kfsheet.exercises._cannonball_sheets import ABOUT, CHARTS, QUESTIONS, SECTIONS
-from kfsheet.expressions import RMS, Mean, Missing, Sum, t, when_observed
+from kfsheet.expressions import RMS, Last, Mean, Missing, Sum, t, when_observed
 from kfsheet.kalman import Observation, State, StateSpace, add_filter
 from kfsheet.recurrence import Recurrence
 from kfsheet.tables import Table, read_table
@@ -97,6 +97,16 @@ def _truth(m: Recurrence) -> None:
     m.define(vy[t], vy[t - 1] - g * dt, "m/s", "truth, vertical velocity", start=[v_0 * sin(angle)])
     up = Piecewise((in_flight[t - 1], y[t] >= 0), (0, True))
     m.define(in_flight[t], up, "", "1 until the ball lands, then 0", start=[1])
+    _landing(m)
+
+
+def _landing(m: Recurrence) -> None:
+    """Whether the table is long enough: one more step would bring the ball below 0."""
+    y, vy, g, dt = m["y_true", "vy_true", "g", "dt"]
+    next_y = Last(y) + Last(vy) * dt - g * dt**2 / 2
+    words = "1: the ball lands; 0: it is still in the air in the last row, so make dt larger"
+    m.summary("landed", Piecewise((1, next_y < 0), (0, True)), "", words)
+    m.summary("flight", Sum(m["in_flight"]), "", "rows with the ball in the air")
 
 
 def _while_flying(m: Recurrence, value: Expr) -> Expr:
@@ -180,21 +190,29 @@ def _errors(m: Recurrence) -> None:
             m.define(e[t], error, unit, f"error of the {what}, {words}")
             if not name.startswith("v"):
                 m.summary(f"rms_{name}_{run}", RMS(e), "m", f"rms error of the {what}, {words}")
-    for name, variance, unit in (
-        ("d_theta", m["S_theta"][t], "rad"),
-        ("d_r", m["S_r_f"][t], "m"),
-        ("e_x_a", m["P_xx_a"][t], "m"),
-        ("e_y_a", m["P_yy_a"][t], "m"),
-    ):
-        low, high = m.columns(f"{name}_low", f"{name}_high", section=page)
-        band, words = _while_flying(m, 2 * sqrt(variance)), f"theory for {name}: 2 sigma"
-        start = [Missing] if name.startswith("d") else []
-        m.define(high[t], band, unit, words, start=start)
-        m.define(low[t], when_observed(high[t], -high[t]), unit, f"{words} below 0")
+    _bands(m, page)
     for run, words in (("", "EKF"), ("_lin", "linear filter")):
         nis = m[f"NIS{run}"]
         m.summary(f"mean_NIS{run}", Mean(nis), "", f"mean NIS, {words}; expected: 2")
-    m.summary("flight", Sum(m["in_flight"]), "", "sweeps until the ball lands")
+
+
+def _bands(m: Recurrence, page: str) -> None:
+    """Twice the deviation that a filter claims, on both sides of 0."""
+    for name, variance, unit in (
+        ("d_theta", "S_theta", "rad"),
+        ("d_r", "S_r_f", "m"),
+        ("e_x_a", "P_xx_a", "m"),
+        ("e_vx_a", "P_vxvx_a", "m/s"),
+        ("e_y_a", "P_yy_a", "m"),
+        ("e_vy_a", "P_vyvy_a", "m/s"),
+        ("e_x_lin", "P_xx_a_lin", "m"),
+        ("e_y_lin", "P_yy_a_lin", "m"),
+    ):
+        low, high = m.columns(f"{name}_low", f"{name}_high", section=page)
+        band, words = _while_flying(m, 2 * sqrt(m[variance][t])), f"theory for {name}: 2 sigma"
+        start = [Missing] if name.startswith("d") else []
+        m.define(high[t], band, unit, words, start=start)
+        m.define(low[t], when_observed(high[t], -high[t]), unit, f"{words} below 0")
 
 
 cannonball = build_model()
@@ -207,6 +225,7 @@ exercise = Exercise(
     notebook="notebooks/02_cannonball.ipynb",
     sections=SECTIONS,
     greyed="in_flight",
+    alarm="landed",
     vary={
         "v_0": (850, 910),
         "angle": (40, 45),
