@@ -246,8 +246,8 @@ pd.DataFrame({a: f.loc[0, ["vx_true", "vy_true"]] for a, f in flights.items()}).
 # ## An update that mixes units
 #
 # The filter measures angle and range; the article's update multiplies its gains with residuals of
-# *position* (**misprint 8**). The first gain turns radians into metres. If we add the printed update
-# to the sheet, do the units still agree?
+# *position* (**misprint 8**). The first gain turns radians into metres. If we add the printed
+# update to the sheet, do the units still agree?
 
 # %%
 mixed, t = build_model(), kf.t
@@ -371,9 +371,9 @@ pd.DataFrame({n: d[469:475] for n, d in over.items() if n != "two"}).round(2)
 
 # %% [markdown]
 # The jump looks like an innovation of $-\pi$. It throws the ball forward; a sweep later the true
-# one has passed as well, and the angles fit again. *Wrapping makes it worse*: $-3.16$ becomes $+3.12$,
-# which throws the ball back to the near side, where every echo is as wrong. How often does that
-# happen? The error of $x$ (m) over 200 flights:
+# one has passed as well, and the angles fit again. *Wrapping makes it worse*: $-3.16$ becomes
+# $+3.12$, which throws the ball back to the near side, where every echo is as wrong. How often does
+# that happen? The error of $x$ (m) over 200 flights:
 
 # %%
 LEVELS = {0.5: "median", 0.75: "3 of 4 below", 0.9: "9 of 10 below", 1: "worst"}
