@@ -229,7 +229,8 @@ figures(sigma_r=30_500).round(0)
 # 23 and 20 km over the flight, 30 and 2 km near its end, where the ball is low. The filter is off
 # by 100 m in $x$. Not the article's result: 30,500 is **misprint 6**; 30.48 m (100 feet) must be
 # meant.
-#
+
+# %% [markdown]
 # ## A misprint that 45 degrees hides
 #
 # The article takes the sine for $v_x$ and the cosine for $v_y$ (**misprint 7**). At 45 degrees both
@@ -332,7 +333,8 @@ _ = ax.legend()
 # With the update the matrices give what the sheet gives. Without it the filter hardly betters the
 # radar: it claims ever more kilometres of ignorance, so it believes every echo and remembers none.
 # The update is how a filter learns that it has learnt.
-#
+
+# %% [markdown]
 # ## The angle jumps
 #
 # $\tan^{-1}(b/a)$ of *one* argument (**misprint 10**) lies between $-\pi/2$ and $\pi/2$. As the
@@ -400,7 +402,8 @@ table.T.round(0).astype(int)
 # %% [markdown]
 # Kilometres. Which figure describes a lost flight is a matter of taste: 24 km is the error of the
 # *height* over the last 100 sweeps; in $x$ it is 91 km there, and 45 km over the whole flight.
-#
+
+# %% [markdown]
 # ## Is the filter honest?
 #
 # A filter says how well it knows. Two numbers test that. $\mathrm{NIS} = d' S^{-1} d$ compares
@@ -508,7 +511,8 @@ pd.DataFrame({s: {name: scalars[name] for name in names} for s, scalars in worse
 # %% [markdown]
 # The radar alone errs three times as much, the filter less than twice: the range is as good as
 # before, and gains weight.
-#
+
+# %% [markdown]
 # ## The ten misprints
 #
 # | | printed | right |
@@ -523,7 +527,8 @@ pd.DataFrame({s: {name: scalars[name] for name in names} for s, scalars in worse
 # | 8 | gains times residuals of position | residuals of angle and range |
 # | 9 | no update of the covariance | $P = M - K H M$ |
 # | 10 | $\tan^{-1}$ of one argument | of two, and innovations wrapped |
-#
+
+# %% [markdown]
 # ## Exercises
 #
 # **Routine**

@@ -199,7 +199,7 @@ def _redden(sheet: Worksheet, layout: Layout, name: str) -> None:
     _, row, column = layout.scalars[name]
     first, value, last = (get_column_letter(column + n) for n in (-1, 0, 2))
     fill = PatternFill("solid", start_color="FFFFC7CE", end_color="FFFFC7CE")
-    rule = FormulaRule(formula=[f"${value}${row}=0"], fill=fill, font=Font(bold=True))
+    rule = FormulaRule(formula=[f"${value}${row}=0"], fill=fill)
     sheet.conditional_formatting.add(f"{first}{row}:{last}{row}", rule)
 
 

@@ -25,7 +25,7 @@ SECTIONS = {
     "Radar": "angle and range: truth plus noise from fixed draws; positions computed from them",
     "EKF": "the extended filter: forecast, innovations one after the other, gain, analysis",
     "Linear": "the linear filter on computed positions (names end in _lin)",
-    "Errors": "estimates minus truth, and the 2 sigma bands that the extended filter claims",
+    "Errors": "estimates minus truth, and the bands of 2 sigma that the filters claim",
 }
 
 

@@ -104,7 +104,7 @@ def _landing(m: Recurrence) -> None:
     """Whether the table is long enough: one more step would bring the ball below 0."""
     y, vy, g, dt = m["y_true", "vy_true", "g", "dt"]
     next_y = Last(y) + Last(vy) * dt - g * dt**2 / 2
-    words = "1: the ball lands; 0: it is still in the air in the last row, so make dt larger"
+    words = "1: the ball lands; 0: it is in the air in the last row, make dt larger"
     m.summary("landed", Piecewise((1, next_y < 0), (0, True)), "", words)
     m.summary("flight", Sum(m["in_flight"]), "", "rows with the ball in the air")
 
