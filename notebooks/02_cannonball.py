@@ -469,7 +469,7 @@ table.round(2)
 # %% [markdown]
 # The more noise it suspects, the more it follows the radar's. And the mean NIS hardly moves: an
 # innovation is mostly the radar's error, so it cannot tell a good filter from a nervous one. Use
-# the errors for that, where there is a truth. See exercise 5 for the other direction.
+# the errors for that, where there is a truth. See exercise 6 for the other direction.
 #
 # ## What if
 #
@@ -544,10 +544,12 @@ pd.DataFrame({s: {name: scalars[name] for name in names} for s, scalars in worse
 #    remember it? Then in all rows.
 # 4. Set `s_x` and `s_y` to 1 m: the filter is now sure of a start that is wrong by 305 m. What
 #    happens to the first innovations, and to `mean_NIS`?
+# 5. Put the radar near the cannon, `x_R` to 100 m. Which filter is honest now, by `mean_NIS`? What
+#    does the tangent of the angle mean where the start is wrong by three times the range?
 #
 # **Extend it**
 #
-# 5. Give the truth a drag (in a file of your own, start from this exercise). By how much must
+# 6. Give the truth a drag (in a file of your own, start from this exercise). By how much must
 #    `Phi_s` grow until the NIS is 2 again, and what do you lose?
-# 6. The linear filter neglects the correlation between the errors of `x_obs` and `y_obs`. Add it:
+# 7. The linear filter neglects the correlation between the errors of `x_obs` and `y_obs`. Add it:
 #    rotate the observations so that their errors are independent again.

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from conftest import need
+from scipy.stats import chi2
 from sympy import Matrix, Symbol, diag, eye, symbols
 
 from kfsheet import (
@@ -270,6 +271,16 @@ def test_every_error_on_a_chart_has_the_band_that_its_filter_claims(frame):
     assert set(bands) <= shown
     for high in (c for c in bands if c.endswith("high")):
         assert (frame[high.replace("high", "low")].dropna() == -frame[high].dropna()).all()
+
+
+def test_near_the_cannon_the_tangents_mislead_and_the_linear_filter_is_the_honest_one():
+    """The start is wrong by three times the range: exercise 5 of the notebook."""
+    frame = evaluate(cannonball, x_R=100)
+    low, high = (bound / 2 / (N - 1) for bound in chi2.interval(0.999, 2 * (N - 1)))
+    scalars = frame.attrs["scalars"]
+    assert low < scalars["mean_NIS_lin"] / 2 < high
+    assert scalars["mean_NIS"] / 2 > 2 * high
+    assert scalars["rms_y_a"] > 10 * scalars["rms_y_lin"]
 
 
 def test_units_agree():
