@@ -72,11 +72,11 @@ def ensembles(number, model=cannonball, **parameters):
 
 
 def assert_among(figure, digit, lines, name):
-    """A figure of another ensemble: within the range that 99.9 % of ensembles like ours keep."""
+    """A figure of another ensemble: within the range that 99 % of ensembles like ours keep."""
     values = np.array([np.mean(line[name]) for line in lines])
     n = len(values)
     scale = values.std(ddof=1) * math.sqrt(1 + 1 / n)
-    low, high = student.interval(0.999, n - 1, values.mean(), scale)
+    low, high = student.interval(0.99, n - 1, values.mean(), scale)
     assert low - digit / 2 < figure < high + digit / 2, (name, values.mean(), scale)
 
 
