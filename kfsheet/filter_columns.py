@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import itertools
-import re
 from collections.abc import Generator, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from sympy import (
     Abs,
@@ -25,17 +24,9 @@ from sympy import (
     zeros,
 )
 
-from kfsheet.checks import ENDLESS
-from kfsheet.expressions import (
-    ColumnBase,
-    Missing,
-    Observed,
-    column_references,
-    t,
-    when_observed,
-)
-from kfsheet.names import CHARACTER_CODE
-from kfsheet.units import parse_unit, unit_text
+from kfsheet.expressions import Missing, Observed
+from kfsheet.filter_cells import Definition, FilterCells, when_words
+from kfsheet.units import parse_unit
 
 if TYPE_CHECKING:
     from kfsheet.kalman import Observation, StateSpace
@@ -54,40 +45,16 @@ def wrapped(angle: Expr) -> Expr:
     return pi - Mod(pi - angle, 2 * pi)
 
 
-def readable(name: str) -> str:
-    """The name, without underscores that would make a part of it the code of a character.
-
-    >>> readable("K_y_theta"), readable("K_x1_theta")
-    ('K_y_theta', 'Kx1_theta')
-    """
-    return re.sub(f"_(?={CHARACTER_CODE[1:]})", "", name)
-
-
-class Definition(NamedTuple):
-    """One column: name, general expression, unit, words, and what stands in row 0."""
-
-    name: str
-    rule: Expr
-    unit: str
-    words: str
-    start: Expr = Missing
-
-
-class FilterColumns:
+class FilterColumns(FilterCells):
     """The columns of a filter, in the order of its equations.
 
     ``x`` and ``P`` are the cells that hold the state and its covariance so far: after the forecast
     (names end in ``_f``), after some of the observations (``_1``, ``_2``, ...), and at last the
-    analysis (``_a``). A covariance that is 0 for ever, and a gain that is, have no columns: what
-    does not depend on each other falls apart into filters of its own.
+    analysis (``_a``).
     """
 
     def __init__(self, m: Recurrence, model: StateSpace, suffix: str) -> None:
-        self.m, self.model, self.suffix = m, model, suffix
-        self.names = [symbol.name for symbol in model.state]
-        self.elements = list(model.state.values())
-        self.units = [parse_unit(element.unit) for element in self.elements]
-        self.related = _related(model)
+        super().__init__(m, model, suffix)
         self.weighed: list[tuple[Indexed, Indexed, tuple[Indexed, ...]]] = []
         self.x = [self.cell(f"{name}_f") for name in self.names]
         self.P = self.covariances("f")
@@ -99,79 +66,6 @@ class FilterColumns:
             yield from self.update(observation, k, h, d)
         yield from self.unobserved()
         yield self.nis()
-
-    # -- cells -----------------------------------------------------------------------------
-
-    @property
-    def all(self) -> range:
-        """Indices of the state."""
-        return range(len(self.names))
-
-    def pairs(self) -> Iterator[tuple[int, int]]:
-        """Indices of the upper triangle, without those that are 0 for ever."""
-        return ((i, j) for i in self.all for j in self.all[i:] if (i, j) in self.related)
-
-    def touched(self, k: int) -> list[int]:
-        """Elements that observation k moves."""
-        h = self.model.H[k, :]
-        return [i for i in self.all if any(h[j] != 0 and (i, j) in self.related for j in self.all)]
-
-    def cell(self, name: str, back: int = 0) -> Indexed:
-        """Cell of a column of this filter, ``back`` rows above."""
-        return ColumnBase(readable(name + self.suffix), real=True)[t - back]
-
-    def P_name(self, i: int, j: int, stage: str) -> str:
-        """Name of an entry of a covariance."""
-        return f"P_{self.names[min(i, j)]}{self.names[max(i, j)]}_{stage}"
-
-    def covariances(self, stage: str, back: int = 0) -> Matrix:
-        """Cells of a covariance, with 0 for what stays 0."""
-
-        def entry(i: int, j: int) -> Expr:
-            known = (i, j) in self.related
-            return self.cell(self.P_name(i, j, stage), back) if known else S.Zero
-
-        return Matrix(len(self.all), len(self.all), entry)
-
-    @property
-    def changing(self) -> set[Symbol]:
-        """Symbols whose values differ from row to row."""
-        return {*self.model.state, *self.model.intermediates}
-
-    def at(self, expression: Expr, cells: Sequence[Expr]) -> Expr:
-        """An expression in symbols of the state and intermediates, with cells in their place."""
-        known = dict(zip(self.model.state, cells, strict=True))
-        known |= {w: self.cell(w.name) for w in self.model.intermediates}
-        return expression.xreplace(known)
-
-    def gaps(self, expression: Expr) -> tuple[Indexed, ...]:
-        """Cells in an expression that may be missing from row 1 on."""
-        cells = sorted(column_references(expression), key=str)
-        after = range(1, ENDLESS)
-        return tuple(c for c in cells if self.m.column(str(c.base.label)).gap_possible(after))
-
-    def column(
-        self, name: str, rule: Expr, unit: Any, words: str, start: Expr = Missing
-    ) -> Definition:
-        """A definition, its name with the suffix."""
-        return Definition(readable(name + self.suffix), rule, unit_text(unit), words, start)
-
-    def covariance(self, i: int, j: int, stage: str, rule: Expr, start: Expr) -> Definition:
-        """An entry of a covariance at a stage."""
-        pair = f"variance of {self.names[i]}"
-        if i != j:
-            pair = f"covariance of {self.names[i]} and {self.names[j]}"
-        unit = self.units[i] * self.units[j]
-        return self.column(self.P_name(i, j, stage), rule, unit, f"{_when(stage)}: {pair}", start)
-
-    def derivative(
-        self, name: str, entry: Expr, cells: Sequence[Expr], unit: Any, words: str
-    ) -> Generator[Definition, None, Expr]:
-        """An entry of a Jacobian: a constant stays where it is used, others get a column."""
-        if not entry.free_symbols & self.changing and not column_references(entry):
-            return entry
-        yield self.column(name, self.at(entry, cells), unit, words)
-        return self.cell(name)
 
     # -- forecast --------------------------------------------------------------------------
 
@@ -314,7 +208,7 @@ class FilterColumns:
         for i in K:
             stage = self.stage(k, i)
             rule = self.guarded(self.x[i] + K[i] * d, asked and (d,), self.x[i])
-            words = f"{_when(stage)}: {self.elements[i].description}"
+            words = f"{when_words(stage)}: {self.elements[i].description}"
             start = self.cell(f"{self.names[i]}_f") if stage == "a" else Missing
             yield self.column(f"{self.names[i]}_{stage}", rule, self.units[i], words, start)
             self.x[i] = self.cell(f"{self.names[i]}_{stage}")
@@ -371,33 +265,6 @@ class FilterColumns:
             return gain
         return Piecewise((gain, Abs(d) <= o.gate * sqrt(S_o)), (S.Zero, True))
 
-    @staticmethod
-    def guarded(rule: Expr, cells: tuple[Indexed, ...], otherwise: Expr = Missing) -> Expr:
-        """A rule where some cells hold numbers; the rule itself if there are none to ask for."""
-        return when_observed(cells, rule, otherwise) if cells else rule
-
-
-def _related(model: StateSpace) -> set[tuple[int, int]]:
-    """Pairs of elements whose covariance does not stay 0 for ever."""
-    every = list(itertools.product(range(len(model.state)), repeat=2))
-    nonzero_F = {(i, j) for i, j in every if model.F[i, j] != 0}
-    nonzero_H = [{j for _, j in every if model.H[k, j] != 0} for k in range(model.H.rows)]
-    found = {(i, i) for i, _ in every} | {(i, j) for i, j in every if model.Q[i, j] != 0}
-    while True:
-        # F P F' relates i and j if they come from k and l that are related.
-        new = {(i, j) for i, k in nonzero_F for j, m in nonzero_F if (k, m) in found}
-        for seen in nonzero_H:
-            moved = {i for i, j in found if j in seen}
-            new |= set(itertools.product(moved, repeat=2))
-        if new <= found:
-            return found
-        found |= new
-
 
 def _terms(expression: Expr) -> int:
     return len(Add.make_args(expression))
-
-
-def _when(stage: str) -> str:
-    words = {"f": "forecast", "a": "analysis", "1": "after the first observation"}
-    return words.get(stage, f"after {stage} observations")

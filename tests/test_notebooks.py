@@ -1,5 +1,6 @@
 """Notebooks are executed, match their sources, and hold outputs that nbval can compare."""
 
+import re
 import sys
 from pathlib import Path
 
@@ -72,6 +73,7 @@ def test_only_interactive_cells_are_left_out_of_the_comparison(source):
 
 def test_nothing_machine_dependent_is_kept(source):
     text = source.with_suffix(".ipynb").read_text()
+    text = re.sub(r'"image/png": ".*"', "", text)  # letters in which any word may turn up
     for word in ("/home/", "/work/", "/tmp/", "np.float64", "0x7f", "Traceback", "stderr"):
         assert word not in text
 

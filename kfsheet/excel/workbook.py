@@ -98,6 +98,8 @@ def assemble(exercise: Exercise, layout: Layout, pages: list[Page], now: Run) ->
         _colour_verdict(book["Check"])
     if exercise.greyed:
         _grey_rows(book, layout, exercise.greyed)
+    if exercise.alarm:
+        _redden(book["Parameters"], layout, exercise.alarm)
     draw(book, exercise, layout)
     _describe(book, exercise)
     return book
@@ -188,6 +190,15 @@ def _colour_verdict(sheet: Worksheet) -> None:
         fill = PatternFill("solid", start_color="FF" + colour, end_color="FF" + colour)
         rule = CellIsRule(operator="equal", formula=[f'"{word}"'], fill=fill, font=Font(bold=True))
         sheet.conditional_formatting.add("B4", rule)
+
+
+def _redden(sheet: Worksheet, layout: Layout, name: str) -> None:
+    """Red for a result, from its symbol to its meaning, where it is 0."""
+    _, row, column = layout.scalars[name]
+    first, value, last = (get_column_letter(column + n) for n in (-1, 0, 2))
+    fill = PatternFill("solid", start_color="FFFFC7CE", end_color="FFFFC7CE")
+    rule = FormulaRule(formula=[f"${value}${row}=0"], fill=fill)
+    sheet.conditional_formatting.add(f"{first}{row}:{last}{row}", rule)
 
 
 def _grey_rows(book: Workbook, layout: Layout, name: str) -> None:

@@ -14,8 +14,9 @@ from kfsheet.exercise import Exercise
 
 
 def exercise_names() -> list[str]:
-    """Names of the exercises that come with kfsheet."""
-    return sorted(module.name for module in pkgutil.iter_modules(__path__))
+    """Names of the exercises that come with kfsheet; a leading underscore marks a part of one."""
+    names = (module.name for module in pkgutil.iter_modules(__path__))
+    return sorted(name for name in names if not name.startswith("_"))
 
 
 def load_exercise(spec: str) -> Exercise:

@@ -13,9 +13,9 @@ from pathlib import Path
 from sympy import Expr, Matrix, Piecewise, Symbol, atan2, cos, diag, pi, sin, sqrt
 
 from kfsheet.algebra import discrete_noise, transition_matrix
-from kfsheet.charts import Chart, Series
-from kfsheet.exercise import Exercise, Question
-from kfsheet.expressions import RMS, Mean, Missing, Sum, t, when_observed
+from kfsheet.exercise import Exercise
+from kfsheet.exercises._cannonball_sheets import ABOUT, CHARTS, QUESTIONS, SECTIONS
+from kfsheet.expressions import RMS, Last, Mean, Missing, Sum, t, when_observed
 from kfsheet.kalman import Observation, State, StateSpace, add_filter
 from kfsheet.recurrence import Recurrence
 from kfsheet.tables import Table, read_table
@@ -97,6 +97,16 @@ def _truth(m: Recurrence) -> None:
     m.define(vy[t], vy[t - 1] - g * dt, "m/s", "truth, vertical velocity", start=[v_0 * sin(angle)])
     up = Piecewise((in_flight[t - 1], y[t] >= 0), (0, True))
     m.define(in_flight[t], up, "", "1 until the ball lands, then 0", start=[1])
+    _landing(m)
+
+
+def _landing(m: Recurrence) -> None:
+    """Whether the table is long enough: one more step would bring the ball below 0."""
+    y, vy, g, dt = m["y_true", "vy_true", "g", "dt"]
+    next_y = Last(y) + Last(vy) * dt - g * dt**2 / 2
+    words = "1: the ball lands; 0: it is in the air in the last row, make dt larger"
+    m.summary("landed", Piecewise((1, next_y < 0), (0, True)), "", words)
+    m.summary("flight", Sum(m["in_flight"]), "", "rows with the ball in the air")
 
 
 def _while_flying(m: Recurrence, value: Expr) -> Expr:
@@ -180,125 +190,32 @@ def _errors(m: Recurrence) -> None:
             m.define(e[t], error, unit, f"error of the {what}, {words}")
             if not name.startswith("v"):
                 m.summary(f"rms_{name}_{run}", RMS(e), "m", f"rms error of the {what}, {words}")
-    for name, variance, unit in (
-        ("d_theta", m["S_theta"][t], "rad"),
-        ("d_r", m["S_r_f"][t], "m"),
-        ("e_x_a", m["P_xx_a"][t], "m"),
-        ("e_y_a", m["P_yy_a"][t], "m"),
-    ):
-        low, high = m.columns(f"{name}_low", f"{name}_high", section=page)
-        band, words = _while_flying(m, 2 * sqrt(variance)), f"theory for {name}: 2 sigma"
-        start = [Missing] if name.startswith("d") else []
-        m.define(high[t], band, unit, words, start=start)
-        m.define(low[t], when_observed(high[t], -high[t]), unit, f"{words} below 0")
+    _bands(m, page)
     for run, words in (("", "EKF"), ("_lin", "linear filter")):
         nis = m[f"NIS{run}"]
         m.summary(f"mean_NIS{run}", Mean(nis), "", f"mean NIS, {words}; expected: 2")
-    m.summary("flight", Sum(m["in_flight"]), "", "sweeps until the ball lands")
+
+
+def _bands(m: Recurrence, page: str) -> None:
+    """Twice the deviation that a filter claims, on both sides of 0."""
+    for name, variance, unit in (
+        ("d_theta", "S_theta", "rad"),
+        ("d_r", "S_r_f", "m"),
+        ("e_x_a", "P_xx_a", "m"),
+        ("e_vx_a", "P_vxvx_a", "m/s"),
+        ("e_y_a", "P_yy_a", "m"),
+        ("e_vy_a", "P_vyvy_a", "m/s"),
+        ("e_x_lin", "P_xx_a_lin", "m"),
+        ("e_y_lin", "P_yy_a_lin", "m"),
+    ):
+        low, high = m.columns(f"{name}_low", f"{name}_high", section=page)
+        band, words = _while_flying(m, 2 * sqrt(m[variance][t])), f"theory for {name}: 2 sigma"
+        start = [Missing] if name.startswith("d") else []
+        m.define(high[t], band, unit, words, start=start)
+        m.define(low[t], when_observed(high[t], -high[t]), unit, f"{words} below 0")
 
 
 cannonball = build_model()
-
-ABOUT = (
-    "A ball is fired at 915 m/s and 45 degrees. A radar 30 km downrange measures its angle "
-    "(error 0.01 rad) and its range (error 30.48 m) ten times a second. There is no drag; the "
-    "filters know gravity, but start with positions and velocities that are wrong.",
-    "Two filters see the same radar. The extended Kalman filter (sheet EKF) takes angle and range "
-    "as they are and linearises them at each forecast: the columns H_. The linear filter (sheet "
-    "Linear) is given positions computed from angle and range, one axis at a time.",
-    "Try this: on the sheet Parameters, make the radar worse (sigma_theta = 0.03) or the barrel "
-    "lower (angle = 35) and look at the Charts. Then set Phi_s to 10: the filters now distrust "
-    "their model, never rest, and follow the noise. mean_NIS tells whether a filter errs as much "
-    "as it says: two observations, so 2 is expected.",
-    "Everything is live. Rows after the landing are grey and leave the statistics. An elevation "
-    "above 45 degrees flies longer than the table; make dt larger.",
-)
-SECTIONS = {
-    "Truth": "the flight without errors, stepped as the source steps it",
-    "Radar": "angle and range: truth plus noise from fixed draws; positions computed from them",
-    "EKF": "the extended filter: forecast, innovations one after the other, gain, analysis",
-    "Linear": "the linear filter on computed positions (names end in _lin)",
-    "Errors": "estimates minus truth, and the 2 sigma bands that the extended filter claims",
-}
-
-
-def _residuals(
-    title: str,
-    label: str,
-    name: str,
-    raw: str = "",
-    note: str = "",
-    limits: tuple[float, float] | None = None,
-) -> Chart:
-    band = (
-        Series("time", f"{name}_low", "", "bound"),
-        Series("time", f"{name}_high", "2 sigma band", "bound"),
-    )
-    cloud = (Series("time", raw, "radar alone", "cloud"),) if raw else ()
-    line = Series("time", name, "EKF" if name.startswith("e") else f"innovation {name}", "line")
-    return Chart(title, "time (s)", label, (*cloud, line, *band), note=note, y_limits=limits)
-
-
-CHARTS = (
-    Chart(
-        "The flight",
-        "x: distance (m)",
-        "y: height (m)",
-        (
-            Series("x_obs", "y_obs", "radar", "cloud"),
-            Series("x_true", "y_true", "truth", "truth"),
-            Series("x_a", "y_a", "EKF", "line"),
-        ),
-        note="Radar positions scatter by 500 m and more; the filter lies on the path.",
-    ),
-    _residuals(
-        "Range",
-        "observed - forecast (m)",
-        "d_r",
-        note="Innovations of r: 19 of 20 within the band. The first ones are outside the picture.",
-        limits=(-150, 150),
-    ),
-    _residuals("Angle", "observed - forecast (rad)", "d_theta", note="Innovations of theta."),
-    _residuals(
-        "Distance", "error of x (m)", "e_x_a", "e_x_obs", "Errors: radar alone, and the EKF's."
-    ),
-    _residuals("Height", "error of y (m)", "e_y_a", "e_y_obs", "The same for the height."),
-    _residuals(
-        "Distance, close up",
-        "error of x (m)",
-        "e_x_a",
-        note="The band is what the EKF claims.",
-        limits=(-60, 60),
-    ),
-    _residuals("Height, close up", "error of y (m)", "e_y_a", note="The same.", limits=(-100, 100)),
-    Chart(
-        "Extended or linear?",
-        "time (s)",
-        "error of y (m)",
-        (
-            Series("time", "e_y_lin", "linear filter", "second line"),
-            Series("time", "e_y_a", "EKF", "line"),
-        ),
-        note="The same radar, two filters.",
-        y_limits=(-200, 200),
-    ),
-)
-QUESTIONS = (
-    Question("x_f", 1, "One step of the motion without drag, from the analysis before."),
-    Question("y_f", 1, "As x_f, with gravity."),
-    Question("vy_f", 1, "Velocity one step later."),
-    Question("d_theta", 2, "Observed minus predicted angle; wrap it to (-pi, pi]."),
-    Question("H_theta_x", 2, "Derivative of the angle; mind the sign."),
-    Question("H_theta_y", 2, "Derivative of the angle with respect to y."),
-    Question("H_r_x", 1, "Derivative of the range with respect to x."),
-    Question("H_r_y", 1, "Derivative of the range with respect to y."),
-    Question("S_theta", 2, "H P H' + r with the covariance of the forecast."),
-    Question("K_x_theta", 2, "P H' / S, first element."),
-    Question("K_y_theta", 2, "P H' / S, third element."),
-    Question("P_xx_1", 2, "P - K S K', first element."),
-    Question("x_a", 1, "The state after both observations."),
-    Question("y_a", 1, "The state after both observations."),
-)
 exercise = Exercise(
     model=cannonball,
     about=ABOUT,
@@ -308,6 +225,7 @@ exercise = Exercise(
     notebook="notebooks/02_cannonball.ipynb",
     sections=SECTIONS,
     greyed="in_flight",
+    alarm="landed",
     vary={
         "v_0": (850, 910),
         "angle": (40, 45),

@@ -1,0 +1,154 @@
+"""What a reader of the cannon-ball's workbook sees beside the numbers: words, charts, questions."""
+
+from __future__ import annotations
+
+from kfsheet.charts import Chart, Series
+from kfsheet.exercise import Question
+
+ABOUT = (
+    "A ball is fired at 915 m/s and 45 degrees. A radar 30 km downrange measures its angle "
+    "(error 0.01 rad) and its range (error 30.48 m) ten times a second. There is no drag; the "
+    "filters know gravity, but start with positions and velocities that are wrong.",
+    "Two filters see the same radar. The extended Kalman filter (sheet EKF) takes angle and range "
+    "as they are and linearises them at each forecast: the columns H_. The linear filter (sheet "
+    "Linear) is given positions computed from angle and range, one axis at a time.",
+    "Try this: on the sheet Parameters, make the radar worse (sigma_theta = 0.03) or the barrel "
+    "lower (angle = 35) and look at the Charts. Then set Phi_s to 10: the filters now distrust "
+    "their model, never rest, and follow the noise. mean_NIS tells whether a filter errs as much "
+    "as it says: two observations, so 2 is expected.",
+    "Everything is live. Rows after the landing are grey and leave the statistics. A ball shot at "
+    "more than 45 degrees is still in the air in the last row: landed, the first of the results, "
+    "is then 0 and red, and the statistics cover only a part of the flight. Make dt larger.",
+)
+SECTIONS = {
+    "Truth": "the flight without errors, stepped as the source steps it",
+    "Radar": "angle and range: truth plus noise from fixed draws; positions computed from them",
+    "EKF": "the extended filter: forecast, innovations one after the other, gain, analysis",
+    "Linear": "the linear filter on computed positions (names end in _lin)",
+    "Errors": "estimates minus truth, and the bands of 2 sigma that the filters claim",
+}
+
+
+NAMES = {"a": ("EKF", "line", "bound"), "lin": ("linear filter", "second line", "second band")}
+
+
+def _claimed(run: str, name: str) -> tuple[Series, ...]:
+    """An error or innovation, within the band that its filter claims."""
+    label, role, band = NAMES[run]
+    return (
+        Series("time", name, label if name.startswith("e") else f"innovation {name}", role),
+        Series("time", f"{name}_low", "", band),
+        Series("time", f"{name}_high", "2 sigma band" + " (linear)" * (run == "lin"), band),
+    )
+
+
+def _over_time(
+    title: str,
+    label: str,
+    series: tuple[Series, ...],
+    note: str,
+    limits: tuple[float, float] | None = None,
+) -> Chart:
+    return Chart(title, "time (s)", label, series, note=note, y_limits=limits)
+
+
+def _cloud(name: str) -> tuple[Series]:
+    return (Series("time", f"e_{name}_obs", "radar alone", "cloud"),)
+
+
+FLIGHT = (
+    Series("x_obs", "y_obs", "radar", "cloud"),
+    Series("x_true", "y_true", "truth", "truth"),
+    Series("x_a", "y_a", "EKF", "line"),
+)
+CHARTS = (
+    Chart(
+        "The flight",
+        "x: distance (m)",
+        "y: height (m)",
+        FLIGHT,
+        note="Radar positions scatter by 500 m and more; the filter lies on the path.",
+    ),
+    _over_time(
+        "Is the filter honest?",
+        "NIS",
+        (Series("time", "NIS", "NIS", "cloud"),),
+        "Normalised innovations squared: 2 in the mean, above 6 in one sweep of 20.",
+        (0, 16),
+    ),
+    _over_time(
+        "Range",
+        "observed - forecast (m)",
+        _claimed("a", "d_r"),
+        "Innovations of r: 19 of 20 within the band. The first ones are outside the picture.",
+        (-150, 150),
+    ),
+    _over_time(
+        "Angle",
+        "observed - forecast (rad)",
+        _claimed("a", "d_theta"),
+        "Innovations of theta.",
+    ),
+    _over_time(
+        "Distance",
+        "error of x (m)",
+        _cloud("x") + _claimed("a", "e_x_a"),
+        "Errors: radar alone, and the EKF's.",
+    ),
+    _over_time(
+        "Height",
+        "error of y (m)",
+        _cloud("y") + _claimed("a", "e_y_a"),
+        "The same for the height.",
+    ),
+    _over_time(
+        "Distance, close up",
+        "error of x (m)",
+        _claimed("a", "e_x_a"),
+        "The band is what the EKF claims.",
+        (-60, 60),
+    ),
+    _over_time(
+        "Height, close up", "error of y (m)", _claimed("a", "e_y_a"), "The same.", (-100, 100)
+    ),
+    _over_time(
+        "Horizontal velocity",
+        "error of vx (m/s)",
+        _claimed("a", "e_vx_a"),
+        "No sensor measures a velocity; the filter infers it.",
+        (-4, 4),
+    ),
+    _over_time(
+        "Vertical velocity", "error of vy (m/s)", _claimed("a", "e_vy_a"), "The same.", (-10, 10)
+    ),
+    _over_time(
+        "Distance, extended or linear?",
+        "error of x (m)",
+        _claimed("lin", "e_x_lin") + _claimed("a", "e_x_a")[:1],
+        "The same radar, two filters; the band is what the linear one claims.",
+        (-60, 60),
+    ),
+    _over_time(
+        "Height, extended or linear?",
+        "error of y (m)",
+        _claimed("lin", "e_y_lin") + _claimed("a", "e_y_a")[:1],
+        "The same for the height.",
+        (-100, 100),
+    ),
+)
+QUESTIONS = (
+    Question("x_f", 1, "One step of the motion without drag, from the analysis before."),
+    Question("y_f", 1, "As x_f, with gravity."),
+    Question("vy_f", 1, "Velocity one step later."),
+    Question("d_theta", 2, "Observed minus predicted angle; wrap it to (-pi, pi]."),
+    Question("H_theta_x", 2, "Derivative of the angle; mind the sign."),
+    Question("H_theta_y", 2, "Derivative of the angle with respect to y."),
+    Question("H_r_x", 1, "Derivative of the range with respect to x."),
+    Question("H_r_y", 1, "Derivative of the range with respect to y."),
+    Question("S_theta", 2, "H P H' + r with the covariance of the forecast."),
+    Question("K_x_theta", 2, "P H' / S, first element."),
+    Question("K_y_theta", 2, "P H' / S, third element."),
+    Question("P_xx_1", 2, "P - K S K', first element."),
+    Question("x_a", 1, "The state after both observations."),
+    Question("y_a", 1, "The state after both observations."),
+)
