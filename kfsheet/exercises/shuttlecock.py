@@ -239,6 +239,12 @@ QUESTIONS = (
     Question("t_fall_raw", 1, "From W back to seconds."),
     Question("x_fall_raw", 1, "The track at t_fall."),
 )
+ASKED_OF_Z = (
+    *("z_f", "vz_f", "az_f", "d_z", "S_z", "K_z_z", "K_vz_z", "z_a", "P_zz_a"),
+    *("p_z_raw", "v_z_raw"),
+)
+# What is asked of z stands beside it for x and y.
+TWINS = (*(name.replace("z", axis) for axis in "xy" for name in ASKED_OF_Z), "y_fall_raw")
 exercise = Exercise(
     model=shuttlecock,
     about=ABOUT,
@@ -251,4 +257,5 @@ exercise = Exercise(
     vary={"v_x": (1.2, 1.8), "v_y": (0.6, 1.0), "v_z": (3.7, 4.2), "k_m": (0.85, 1.15)},
     noise=("n_x", "n_y", "n_z"),
     frozen=("Truth", "Fit filtered", "Latest state", "Exact filter"),
+    veiled=TWINS,
 )
