@@ -1,5 +1,7 @@
 """The literal loop of section 3.6: it settles, and depth keeps its first error."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize
@@ -81,6 +83,14 @@ def test_cones_that_do_not_meet_are_told():
     two = Cones(np.array([5.0, -5, 1]), np.array([[0, 1.0, 0]]), 0.01)
     with pytest.raises(DataError, match="do not meet"):
         project_on_both(one, two, [[5, 0, 0]])
+
+
+def test_the_image_whose_cones_do_not_meet_is_named_by_its_own_number():
+    """Image 9 is the fifth of the overlap; it is 9 that its user finds in the table."""
+    shot = SHOTS["A"]
+    wrong = np.where(np.arange(101)[:, None] == 9, shot.pixels_2 + [0, 20], shot.pixels_2)
+    with pytest.raises(DataError, match="error cones of image 9 do not meet"):
+        iterate(replace(shot, pixels_2=wrong))
 
 
 def test_the_weights_are_the_reports():

@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kfsheet.tennis.dynamics import GRAVITY
-from kfsheet.tennis.inputs import Array, array, number
+from kfsheet.tennis.inputs import Array, array
 
 SERIES = 20  # terms that give phi to rounding for |z| <= 1
+COEFFICIENTS = {m: [1 / factorial(n + m) for n in reversed(range(SERIES))] for m in (1, 2)}
 
 
 def phi(order: int, z: ArrayLike) -> Array:
@@ -33,34 +34,40 @@ def phi(order: int, z: ArrayLike) -> Array:
         Complex.
     """
     z = np.asarray(z, complex)
-    series = np.polyval([1 / factorial(n + order) for n in reversed(range(SERIES))], z)
-    far = np.where(np.abs(z) > 1, z, 1)
-    direct = (np.exp(far) - 1) / far if order == 1 else (np.exp(far) - 1 - far) / far**2
-    return np.where(np.abs(z) > 1, direct, series)
+    far = np.abs(z) > 1
+    found = np.array(np.polyval(COEFFICIENTS[order], np.where(far, 0, z)))
+    w = z[far]
+    found[far] = (np.exp(w) - 1) / w if order == 1 else (np.exp(w) - 1 - w) / w**2
+    return found
 
 
 def closed_form(
     times: ArrayLike,
     X: ArrayLike,
     V: ArrayLike,
-    kappa: float,
+    kappa: ArrayLike,
     spin: ArrayLike,
-    g: float = GRAVITY,
+    g: ArrayLike = GRAVITY,
 ) -> Array:
-    """Positions (n, 3) at times (n,), by (3.5) in its regular form, m.
+    """Positions at times (n,), by (3.5) in its regular form, m.
 
     Parameters
     ----------
     times : array_like
         (n,), s.
     X, V : array_like
-        (3,) position in m and velocity in m/s at t = 0.
-    kappa : float
-        Drag c_D/m, 1/m; it acts with the speed |V| of the start.
+        (..., 3) positions in m and velocities in m/s at t = 0; one ball, or many at once.
+    kappa : array_like
+        (...) drag c_D/m, 1/m; it acts with the speed |V| of the start.
     spin : array_like
-        (3,) lift lambda = c_L Omega/m, 1/s.
-    g : float
-        Gravity, m/s2.
+        (..., 3) lift lambda = c_L Omega/m, 1/s.
+    g : array_like
+        (...) gravity, m/s2.
+
+    Returns
+    -------
+    ndarray
+        (..., n, 3).
 
     Examples
     --------
@@ -69,21 +76,22 @@ def closed_form(
     """
     times, X = array("times", times, (None,)), array("X", X, (3,))
     V, spin = array("V", V, (3,)), array("spin", spin, (3,))
-    decay = number("kappa", kappa) * np.linalg.norm(V)
-    turn = np.linalg.norm(spin)
-    axis = spin / turn if turn else np.array([1.0, 0, 0])
-    down = np.array([0, 0, number("g", g)])
+    decay = array("kappa", kappa, ()) * np.linalg.norm(V, axis=-1)
+    down = array("g", g, ())[..., None] * np.array([0, 0, 1.0])
+    turn = np.linalg.norm(spin, axis=-1)
+    axis = spin / np.where(turn > 0, turn, 1)[..., None]  # 0 without spin: all is across it
+    straight = np.multiply.outer(-decay, times)
+    z = straight + 1j * np.multiply.outer(turn, times)
 
     def apply(order: int, vector: Array) -> Array:
         """phi(Bt) of a vector: its part along the axis, and the part that turns around it."""
-        straight = phi(order, -decay * times).real
-        turning = phi(order, (-decay + 1j * turn) * times)
-        along = (vector @ axis) * axis
-        across = vector - along
+        along = (vector * axis).sum(axis=-1, keepdims=True) * axis
+        turning = phi(order, z)[..., None]
         return (
-            straight[:, None] * along
-            + turning.real[:, None] * across
-            + turning.imag[:, None] * np.cross(axis, vector)
+            phi(order, straight).real[..., None] * along[..., None, :]
+            + turning.real * (vector - along)[..., None, :]
+            + turning.imag * np.cross(axis, vector)[..., None, :]
         )
 
-    return X + times[:, None] * apply(1, V) - times[:, None] ** 2 * apply(2, down)
+    t = times[:, None]
+    return X[..., None, :] + t * apply(1, V) - t**2 * apply(2, down)
