@@ -117,10 +117,12 @@ H, V = cameras.error_diamond(theta)
 print(f"least rms at an apex of {np.degrees(cameras.best_apex()):.1f} degrees")
 
 # %%
+curves = {"H, along the base": H, "V, across": V, "rms error": cameras.rms_error(theta)}
 fig, ax = plt.subplots(figsize=(7, 3.6), layout="constrained")
-for name, y in (("H", H), ("V", V), ("rms", cameras.rms_error(theta))):
+for name, y in curves.items():
     ax.plot(np.degrees(theta), 1e3 * y, label=name)
-ax.set(xlabel="theta (degrees)", ylabel="mm")
+ax.set(xlabel="theta, line of sight against base (degrees)", ylabel="error (mm)")
+ax.grid(alpha=0.3)
 _ = ax.legend()
 
 # %% [markdown]
@@ -342,6 +344,21 @@ pd.DataFrame(table).T
 # %%
 rows = {n: 1e3 * A.rms(run_A.turns[n].x) for n in (0, 1, 5, 20, 100)}
 pd.DataFrame(rows, AXES).T.round(1)
+
+# %% [markdown]
+# The same as a picture: on the left what the engineer sees, on the right what only the truth shows.
+
+# %%
+turns = run_A.turns[1:]
+known = 1e3 * np.array([A.rms(turn.x) for turn in turns])
+fig, (left, right) = plt.subplots(1, 2, figsize=(12, 3.8), layout="constrained")
+left.loglog([t.n for t in turns], [1e3 * t.moved for t in turns])
+left.set(xlabel="turn", ylabel="rms change of the positions (mm)", title="It seems to converge")
+right.loglog([t.n for t in turns], known, label=["x1, the depth", "x2", "x3"])
+right.set(xlabel="turn", ylabel="rms error (mm)", title="It does not")
+for ax in (left, right):
+    ax.grid(alpha=0.3, which="both")
+_ = right.legend()
 
 # %% [markdown]
 # Sideways and upwards the loop does what it promises: from 15 or 20 cm to 1 cm. But the depth $x_1$
@@ -633,13 +650,14 @@ for (name, shot), model in zip(SHOTS.items(), (tennis, build_model(B)), strict=T
     rows[name, "optimum"] = rms_mm(best - shot.truth)
     rows[name, "theory"] = theory_mm(shot, **KNOWN)
     rows[name, "filter - optimum"] = rms_mm(paths - best)
-    rows[name, "without image 0"] = rms_mm(paths - [fitted(d, 1) for d in DRAWS[name]])
+    rows[name, "the same, no image 0"] = rms_mm(paths - [fitted(d, 1) for d in DRAWS[name]])
 pd.DataFrame(rows).T
 
 # %% [markdown]
 # The filter errs as much as the optimum. It differs from it by less than a quarter of that error,
 # in depth almost all of it for want of image 0: from the optimum of the same photos it differs by
-# DIFF mm. All in one pass, with nothing but cells. But drag and spin it does not find.
+# 0.11 mm in A, 0.01 mm in B. All in one pass, with nothing but cells. But drag and spin it does not
+# find.
 #
 # ## Where it comes down
 #

@@ -93,6 +93,8 @@ def _parameters(m: Recurrence, scene: Scene) -> None:
     m.parameter("sigma_px", SIGMA, "px", "error of a pixel", sign="positive")
     m.parameter("s_x", 0.1, "m", "start, claimed error of the position", sign="positive")
     m.parameter("s_v", 1, "m/s", "start, claimed error of the velocity", sign="positive")
+    rounded = "start, rounded to this part of the claimed error"
+    m.parameter("n_round", 100, "", rounded, sign="positive")
     m.parameter("Phi_s", 0, "m2/s3", "noise of the model, spectral density", sign="nonnegative")
     m.parameter("h_fly", 0.01, "s", "longest step of the flight to the ground", sign="positive")
     m.time(t * dt, "s", "time since the first image")

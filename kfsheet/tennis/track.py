@@ -106,18 +106,18 @@ def add_start(m: Recurrence) -> None:
     for k, bend in zip(AXES, push(m, slope, length(slope)), strict=True):
         a = m.summary(f"a{k}_mid", bend, "m/s2", f"acceleration {k} at that velocity")
         level = middle[k - 1] - slope[k - 1] * t_m + a * (t_m**2 - spread) / 2
-        m.summary(f"x{k}_0", _rounded(level, m["s_x"]), "m", f"start, x{k}")
-        speed = _rounded(slope[k - 1] - a * t_m, m["s_v"])
+        m.summary(f"x{k}_0", _rounded(level, m["s_x"], m["n_round"]), "m", f"start, x{k}")
+        speed = _rounded(slope[k - 1] - a * t_m, m["s_v"], m["n_round"])
         m.summary(f"v{k}_0", speed, "m/s", f"start, velocity {k}")
 
 
-def _rounded(value: Expr, error: Expr) -> Expr:
-    """To a tenth of the error that is claimed: it claims no more.
+def _rounded(value: Expr, error: Expr, parts: Expr) -> Expr:
+    """To a fraction of the error that is claimed: it claims no more.
 
     Programs add in different orders. Rounded, the start is the same in all of them to the last
     digit, which an innovation, a small difference of large pixels, would otherwise magnify.
     """
-    return floor(10 * value / error + S.Half) * error / 10
+    return floor(parts * value / error + S.Half) * error / parts
 
 
 def add_flight(m: Recurrence) -> None:
