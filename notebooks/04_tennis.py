@@ -613,12 +613,12 @@ _ = kf.draw(CHARTS["Innovations of v1"], run, axes[1])
 state = ["x1_a", "x2_a", "x3_a"]
 vaguer = kf.evaluate(tennis, s_x=0.3, s_v=3)
 claimed = [np.sqrt(run[f"P_{x}{x}_a"].iloc[-1]) for x in AXES]
-change = (vaguer[state] - run[state]).iloc[-1].tolist()
+change = (vaguer[state] - run[state]).iloc[-1].abs().tolist()
 pd.DataFrame({"change (mm)": change, "claimed (mm)": claimed}, state).mul(1e3).round(2)
 
 # %% [markdown]
-# Less than a tenth of the error that the filter claims. How near does it come to the optimum, a
-# least squares fit of all pixels that knows drag and spin as well? Without noise of the model,
+# Less than a hundredth of the error that the filter claims. How near does it come to the optimum,
+# a least squares fit of all pixels that knows drag and spin as well? Without noise of the model,
 # flying the last analysis backwards gives the smoothed path. Forty draws, also with a fit that does
 # without image 0, as the filter does:
 
