@@ -19,26 +19,24 @@ from numpy.typing import ArrayLike
 from kfsheet.tennis.dynamics import GRAVITY
 from kfsheet.tennis.inputs import Array, array
 
-SERIES = 20  # terms that give phi to rounding for |z| <= 1
-COEFFICIENTS = {m: [1 / factorial(n + m) for n in reversed(range(SERIES))] for m in (1, 2)}
+COEFFICIENTS = [1 / factorial(n + 2) for n in reversed(range(18))]
+"""Of phi2; these terms give it to rounding for |z| <= 1."""
 
 
-def phi(order: int, z: ArrayLike) -> Array:
-    """Entire functions phi1(z) = (e^z - 1)/z and phi2(z) = (e^z - 1 - z)/z^2, elementwise.
+def phi(z: ArrayLike) -> tuple[Array, Array]:
+    """Entire functions phi1(z) = (e^z - 1)/z = 1 + z phi2(z) and phi2(z) = (e^z - 1 - z)/z^2.
 
     Parameters
     ----------
-    order : {1, 2}
-        Which of the two.
     z : array_like
-        Complex.
+        Real or complex; the functions are taken elementwise.
     """
-    z = np.asarray(z, complex)
+    z = np.asarray(z)
     far = np.abs(z) > 1
-    found = np.array(np.polyval(COEFFICIENTS[order], np.where(far, 0, z)))
+    second = np.array(np.polyval(COEFFICIENTS, np.where(far, 0, z)))
     w = z[far]
-    found[far] = (np.exp(w) - 1) / w if order == 1 else (np.exp(w) - 1 - w) / w**2
-    return found
+    second[far] = (np.exp(w) - 1 - w) / w**2
+    return 1 + z * second, second
 
 
 def closed_form(
@@ -80,17 +78,18 @@ def closed_form(
     down = array("g", g, ())[..., None] * np.array([0, 0, 1.0])
     turn = np.linalg.norm(spin, axis=-1)
     axis = spin / np.where(turn > 0, turn, 1)[..., None]  # 0 without spin: all is across it
-    straight = np.multiply.outer(-decay, times)
-    z = straight + 1j * np.multiply.outer(turn, times)
+    real = np.multiply.outer(-decay, times)
+    straight = phi(real)
+    turning = phi(real + 1j * np.multiply.outer(turn, times))
 
     def apply(order: int, vector: Array) -> Array:
         """phi(Bt) of a vector: its part along the axis, and the part that turns around it."""
         along = (vector * axis).sum(axis=-1, keepdims=True) * axis
-        turning = phi(order, z)[..., None]
+        turned = turning[order - 1][..., None]
         return (
-            phi(order, straight).real[..., None] * along[..., None, :]
-            + turning.real * (vector - along)[..., None, :]
-            + turning.imag * np.cross(axis, vector)[..., None, :]
+            straight[order - 1][..., None] * along[..., None, :]
+            + turned.real * (vector - along)[..., None, :]
+            + turned.imag * np.cross(axis, vector)[..., None, :]
         )
 
     t = times[:, None]
