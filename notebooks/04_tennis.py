@@ -25,9 +25,8 @@ from kfsheet.tennis import calibration, cameras, centroid, loop, reprojection, s
 from kfsheet.tennis.closed_form import closed_form
 from kfsheet.tennis.dynamics import MASS, TEXTBOOK_DRAG, Ball, impact, nine_quantities
 
-init_printing(use_latex="mathjax", latex_printer=lambda e, **_: kf.latex_code(e))
-
 # %%
+init_printing(use_latex="mathjax", latex_printer=lambda e, **_: kf.latex_code(e))
 CHARTS = {chart.title: chart for chart in exercise.charts}
 A, B = read_drive(), read_toss()
 SHOTS = {"A, a drive": A, "B, a slow toss": B}
@@ -508,9 +507,9 @@ pd.DataFrame(
 # eight images of camera 2 set the scale:
 
 # %%
-for name, shot in SHOTS.items():
-    fit = reprojection.fit_pixels(shot, g=None)
-    print(f"{name}: g = {fit.ball.g:.2f}, claimed error {fit.sigma['g'][0]:.2f} m/s2")
+free = {name: reprojection.fit_pixels(shot, g=None) for name, shot in SHOTS.items()}
+found = {name: [fit.ball.g, fit.sigma["g"][0]] for name, fit in free.items()}
+pd.DataFrame(found, ["g (m/s2)", "claimed error"]).T.round(2)
 
 # %% [markdown]
 # Both within their claimed errors, or nearly: here $g$ would be an honest test. How well do we know
