@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from kfsheet.kalman import Observation, StateSpace
     from kfsheet.recurrence import Recurrence
 
+MOST_SHARES = 2  # of NIS within one formula, where observations may be missing
 MOST_TERMS = 6  # of a product of matrices within one formula; more get columns of their own
 
 
@@ -65,7 +66,7 @@ class FilterColumns(FilterCells):
             h, d = yield from self.innovation(observation, k)
             yield from self.update(observation, k, h, d)
         yield from self.unobserved()
-        yield self.nis()
+        yield from self.nis()
 
     # -- forecast --------------------------------------------------------------------------
 
@@ -245,18 +246,23 @@ class FilterColumns(FilterCells):
             forecast = self.cell(self.P_name(i, j, "f"))
             yield self.covariance(i, j, "a", forecast, forecast)
 
-    def nis(self) -> Definition:
+    def nis(self) -> Iterator[Definition]:
         """The sum of d^2/S over the observations that are there."""
         parts = [
             self.guarded(d**2 / S_o, asked, S.Zero if len(self.weighed) > 1 else Missing)
             for d, S_o, asked in self.weighed
         ]
-        rule = Add(*parts)
         seen = [And(*map(Observed, asked)) for _, _, asked in self.weighed]
-        if len(parts) > 1 and Or(*seen) != True:  # noqa: E712 - a SymPy condition
+        missing_some = len(parts) > 1 and Or(*seen) != True  # noqa: E712 - a SymPy condition
+        if missing_some and len(parts) > MOST_SHARES:
+            for n, (part, o) in enumerate(zip(parts, self.model.observations, strict=True)):
+                yield self.column(f"NIS_{o.name}", part, parse_unit(""), f"share of {o.name}")
+                parts[n] = self.cell(f"NIS_{o.name}")
+        rule = Add(*parts)
+        if missing_some:
             rule = Piecewise((rule, Or(*seen)), (Missing, True))
         words = f"normalised innovation squared; expected: {len(parts)}"
-        return self.column("NIS", rule, parse_unit(""), words)
+        yield self.column("NIS", rule, parse_unit(""), words)
 
     @staticmethod
     def gated(o: Observation, gain: Expr, d: Indexed, S_o: Indexed) -> Expr:

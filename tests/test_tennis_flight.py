@@ -1,6 +1,4 @@
-"""Dynamics of the tennis report: expansion, closed form, flights; and the fit of pixels."""
-
-from dataclasses import replace
+"""Dynamics of the tennis report: expansion, closed form, flights, and the scale gauge."""
 
 import numpy as np
 import pytest
@@ -13,7 +11,6 @@ from kfsheet.exercises.tennis import read_drive, read_toss
 from kfsheet.tennis import symbolic as sym
 from kfsheet.tennis.closed_form import closed_form
 from kfsheet.tennis.dynamics import (
-    MASS,
     TEXTBOOK_DRAG,
     Ball,
     acceleration,
@@ -21,8 +18,7 @@ from kfsheet.tennis.dynamics import (
     impact,
     nine_quantities,
 )
-from kfsheet.tennis.reprojection import fit_pixels
-from kfsheet.tennis.shots import DRIVE, TOSS, TRUE_DRAG, TRUE_SPIN, simulate
+from kfsheet.tennis.shots import DRIVE, TOSS
 
 TIMES = np.linspace(0, 1, 101)
 SHOTS = {"A": read_drive(), "B": read_toss()}
@@ -184,84 +180,7 @@ def test_a_flight_backwards_undoes_a_flight():
         impact(Ball((0, 0, 1), (0, 0, 1), g=-1), longest=5)
 
 
-# -- the fit of pixels ---------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("name", "c_D", "where"), [("A", 0.001249, (30.573, 6.998)), ("B", 0.001204, (11.547, 6.218))]
-)
-def test_the_fit_of_the_given_pixels_is_the_references(name, c_D, where):
-    fit = fit_pixels(SHOTS[name])
-    assert fit.ball.kappa * MASS == pytest.approx(c_D, abs=5e-7)
-    assert impact(fit.ball)[1][:2] == pytest.approx(where, abs=5e-4)
-    assert fit.rms == pytest.approx(0.2, rel=0.05)
-
-
-def test_the_fit_finds_the_truth_without_noise(name, shot):
-    exact = replace(shot, truth=shot.scene.ball.fly(shot.times))  # the table has six decimals
-    clean = simulate(exact, 0, sigma=1e-9)
-    for options in ({}, {"g": None}, {"kappa": TRUE_DRAG}, {"spin": TRUE_SPIN}):
-        ball = fit_pixels(clean, **options).ball
-        assert np.abs(ball.fly(shot.times) - exact.truth).max() < 1e-6
-        assert [ball.c_D, ball.g] == pytest.approx([0.0012, 9.8], rel=1e-4)
-
-
-def ensemble(shot, seeds, **options):
-    fits = [fit_pixels(simulate(shot, seed), **options) for seed in range(seeds)]
-    errors = [fit.ball.fly(shot.times) - shot.truth for fit in fits]
-    return 1e3 * np.sqrt(np.mean(np.square(errors), axis=(0, 1))), fits
-
-
-@pytest.mark.parametrize(
-    ("name", "free", "known"),
-    [("A", (75, 4, 1.5), (5.8, 0.8, 0.5)), ("B", (26, 1.9, 1.3), (4.1, 0.4, 0.3))],
-)
-def test_measured_drag_beats_free_drag_by_a_factor_of_ten_in_depth(name, free, known):
-    """The reference's draws gave some 30 % more than ours: both vary, from 40 flights of noise."""
-    ours, _ = ensemble(SHOTS[name], 12)
-    np.testing.assert_allclose(ours, free, rtol=0.5)
-    with_drag, _ = ensemble(SHOTS[name], 12, kappa=TRUE_DRAG)
-    np.testing.assert_allclose(with_drag, known, rtol=0.5)
-    assert with_drag[0] < ours[0] / 4
-
-
-def test_the_errors_that_a_fit_claims_are_those_it_makes():
-    _, fits = ensemble(SHOTS["B"], 40, kappa=TRUE_DRAG)
-    found = np.std([np.r_[f.ball.X, f.ball.V, f.ball.spin] for f in fits], axis=0)
-    claimed = np.concatenate([fits[0].sigma[part] for part in ("X", "V", "spin")])
-    np.testing.assert_allclose(found, claimed, rtol=0.4)
-
-
-@pytest.mark.parametrize(("name", "free", "known"), [("A", 0.20, 0.08), ("B", 0.10, 0.03)])
-def test_thirty_images_foretell_the_impact(name, free, known):
-    """How far out (x1) the ball comes down, from 30 of 101 images, with spin across V only."""
-    shot = SHOTS[name]
-    truth = impact(shot.scene.ball)[1]
-
-    def misses(**options):
-        fits = (fit_pixels(simulate(shot, s).first(30), **options) for s in range(16))
-        return np.array([impact(fit.ball)[1] - truth for fit in fits])
-
-    def rms(values):
-        return np.sqrt(np.mean(values**2))
-
-    assert rms(misses(spin="across")[:, 0]) == pytest.approx(free, rel=0.5)
-    early = misses(spin="across", kappa=TRUE_DRAG)
-    assert rms(early[:, 0]) == pytest.approx(known, rel=0.5)
-    # A component along V ruins it, and so does dropping the spin altogether.
-    whole = misses(spin="full", kappa=TRUE_DRAG)
-    assert rms(whole[:, 1]) > 3 * rms(early[:, 1])
-    none = np.linalg.norm(misses(spin="none", kappa=TRUE_DRAG), axis=1)
-    assert none.min() > 3 * known
-
-
-def test_a_fit_refuses_what_it_cannot_do(shot):
-    with pytest.raises(DataError, match="must be one of"):
-        fit_pixels(shot, spin="sideways")
-    with pytest.raises(DataError, match="unknowns"):
-        fit_pixels(shot.first(7).first(2), start=shot.scene.ball)
-    with pytest.raises(DataError, match="two images"):
-        fit_pixels(shot.first(4))
+# -- the scale gauge ----------------------------------------------------------------------
 
 
 def test_camera_1_cannot_tell_the_scale(name, shot):

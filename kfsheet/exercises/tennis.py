@@ -11,29 +11,26 @@ from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sympy import Expr, Piecewise, S, Symbol, diag, floor, sqrt, zeros
+from sympy import Piecewise, Symbol, diag, sqrt, zeros
 
-from kfsheet.charts import Chart, Series
 from kfsheet.exercise import Exercise, Question
 from kfsheet.expressions import (
     RMS,
-    Count,
     Last,
-    Mean,
     Missing,
     Observed,
     Sum,
-    SumProduct,
     t,
     when_observed,
 )
 from kfsheet.kalman import Intermediate, Observation, State, StateSpace, add_filter
 from kfsheet.recurrence import Recurrence
 from kfsheet.tennis.cameras import FOCAL_LENGTH, PIXELS
+from kfsheet.tennis.charts import CHARTS
 from kfsheet.tennis.dynamics import GRAVITY
 from kfsheet.tennis.sheets import add_cameras, add_centroid
 from kfsheet.tennis.shots import DRIVE, SIGMA, TOSS, Scene, Shot, read_shot, simulate
-from kfsheet.tennis.track import AXES, add_flight, add_triangulation, length, push
+from kfsheet.tennis.track import AXES, add_flight, add_start, add_triangulation, length, push
 
 if TYPE_CHECKING:
     from numpy.random import RandomState
@@ -75,7 +72,7 @@ def build_model(shot: Shot | None = None, name: str = "tennis") -> Recurrence:
     add_centroid(m)
     _photos(m, shot)
     add_triangulation(m)
-    _start(m)
+    add_start(m)
     add_filter(m, flight_model(m), section="Kalman filter")
     add_flight(m)
     _errors(m, shot)
@@ -96,6 +93,8 @@ def _parameters(m: Recurrence, scene: Scene) -> None:
     m.parameter("sigma_px", SIGMA, "px", "error of a pixel", sign="positive")
     m.parameter("s_x", 0.1, "m", "start, claimed error of the position", sign="positive")
     m.parameter("s_v", 1, "m/s", "start, claimed error of the velocity", sign="positive")
+    rounded = "start, rounded to this part of the claimed error"
+    m.parameter("n_round", 100, "", rounded, sign="positive")
     m.parameter("Phi_s", 0, "m2/s3", "noise of the model, spectral density", sign="nonnegative")
     m.parameter("h_fly", 0.01, "s", "longest step of the flight to the ground", sign="positive")
     m.time(t * dt, "s", "time since the first image")
@@ -105,44 +104,6 @@ def _photos(m: Recurrence, shot: Shot) -> None:
     for name, (words, camera, way) in PHOTOS.items():
         pixels = (shot.pixels_1, shot.pixels_2)[camera - 1][:, way]
         m.data(name, pixels, "px", words, section="Photos", may_be_missing=True)
-
-
-def _start(m: Recurrence) -> None:
-    """Position and velocity at t = 0 from a parabola through the triangulated points.
-
-    The slope through points at even times is the velocity at their middle; drag, spin and gravity
-    at that velocity bend the parabola.
-    """
-    when, off = m.columns("time_tri", "time_off", section="Triangulation")
-    seen = when_observed(m["x1_tri"][t], m.clock.base[t])
-    m.define(when[t], seen, "s", "time of the image, where both cameras have it")
-    n = m.summary("n_tri", Count(when), "", "images that both cameras have")
-    t_m = m.summary("t_mid", Mean(when), "s", "middle of their times")
-    # Times since the middle: sums of products of times since 0 would cancel, and lose digits.
-    m.define(off[t], when_observed(when[t], when[t] - t_m), "s", "time since the middle of those")
-    spread = m.summary("t_var", SumProduct(off, off) / n, "s2", "variance of those times")
-    middle, slope = [], []
-    for k in AXES:
-        x = m[f"x{k}_tri"]
-        middle.append(m.summary(f"x{k}_mid", Mean(x), "m", f"mean of x{k}_tri"))
-        # The times since the middle sum up to rounding errors only; they must not meet 5 m.
-        rule = (SumProduct(off, x) - Sum(off) * middle[-1]) / (n * spread)
-        slope.append(m.summary(f"v{k}_mid", rule, "m/s", f"slope of x{k}_tri"))
-    for k, bend in zip(AXES, push(m, slope, length(slope)), strict=True):
-        a = m.summary(f"a{k}_mid", bend, "m/s2", f"acceleration {k} at that velocity")
-        level = middle[k - 1] - slope[k - 1] * t_m + a * (t_m**2 - spread) / 2
-        m.summary(f"x{k}_0", _rounded(level, m["s_x"]), "m", f"start, x{k}")
-        speed = _rounded(slope[k - 1] - a * t_m, m["s_v"])
-        m.summary(f"v{k}_0", speed, "m/s", f"start, velocity {k}")
-
-
-def _rounded(value: Expr, error: Expr) -> Expr:
-    """To a tenth of the error that is claimed: it claims no more.
-
-    Programs add in different orders. Rounded, the start is the same in all of them to the last
-    digit, which an innovation, a small difference of large pixels, would otherwise magnify.
-    """
-    return floor(10 * value / error + S.Half) * error / 10
 
 
 def flight_model(m: Recurrence) -> StateSpace:
@@ -208,9 +169,12 @@ def _errors(m: Recurrence, shot: Shot) -> None:
         words = f"band of d_{name}, once it is narrow"
         m.define(high[t], band, "px", f"{words}: +2 sigma", start=[Missing])
         m.define(low[t], when_observed(high[t], -high[t]), "px", f"{words}: -2 sigma")
-    (seen,) = m.columns("n_seen", section=page)
-    number = sum(when_observed(m[name][t], 1, 0) for name in PHOTOS)
-    m.define(seen[t], number, "", "pixels that the filter was given", start=[0])
+    one, two, seen = m.columns("n_1", "n_2", "n_seen", section=page)
+    for column, (u, v) in ((one, ("u1", "v1")), (two, ("u2", "v2"))):
+        number = when_observed(m[u][t], 1, 0) + when_observed(m[v][t], 1, 0)
+        words = f"pixels of camera {u[-1]} that the filter was given; none in its first row"
+        m.define(column[t], number, "", words, start=[0])
+    m.define(seen[t], one[t] + two[t], "", "pixels of both")
     ratio = Sum(m["NIS"]) / Sum(seen)
     m.summary("mean_NIS", ratio, "", "NIS for one pixel; an honest filter: 1")
 
@@ -224,6 +188,10 @@ ABOUT = (
     "Triangulation needs both cameras. The filter (sheet Kalman filter) takes every pixel by "
     "itself, up to four in an image, and carries position and velocity by the equation of the "
     "flight with drag and spin. The sheet Flight goes on from its last analysis to the ground.",
+    "The filter starts from a parabola through the triangulated points, so the pixels of images 5 "
+    "to 12 count twice: in the start, and when their turn comes. But the start claims s_x and s_v "
+    "as its errors, some fifty times its own, and so has little weight. In its first row the "
+    "filter takes no photo: the two pixels of image 0 are not used.",
     "Try this: on the sheet Parameters, set kappa to 0.0186 (drag measured 10 % too low): the "
     "innovations of camera 1 leave their band, mean_NIS rises, and the impact moves. Or delete the "
     "photos of camera 2 from image 7 on, and see what the depth x1 then is worth.",
@@ -235,77 +203,12 @@ SECTIONS = {
     "Cameras": "the error diamond of two lines of sight, for each angle",
     "Centroid": "a shaded ball of 8 pixels, pixel by pixel, and its centre of intensity",
     "Photos": "pixels of both cameras; an empty cell is a photo that is missing",
-    "Triangulation": "closest points of two lines of sight, the midpoint and the gap",
-    "Kalman filter": "a midpoint step of the flight, then up to four pixels, one after the other",
+    "Triangulation": "closest points of two lines of sight, their midpoint, the gap; the start",
+    "Kalman filter": "a midpoint step of the flight, then up to four pixels, one after the other; "
+    "the first row is the start, and takes none",
     "Flight": "steps of Runge and Kutta from the last analysis to the ground",
     "Errors": "estimates minus truth, and the bands that the filter claims for its innovations",
 }
-
-
-def _path(title: str, k: int, label: str, note: str) -> Chart:
-    series = (
-        Series("x1_true", f"x{k}_true", "truth", "truth"),
-        Series("x1_tri", f"x{k}_tri", "triangulation", "observation"),
-        Series("x1_a", f"x{k}_a", "filter", "line"),
-        Series("x1_fly", f"x{k}_fly", "to the ground", "free"),
-    )
-    return Chart(title, "x1: away from camera 1 (m)", label, series, note)
-
-
-def _innovations(name: str, role: str, note: str) -> Chart:
-    band = "second band" if role == "second" else "band"
-    series = (
-        Series("time", f"d_{name}", f"innovation d_{name}", role),
-        Series("time", f"d_{name}_low", "", band),
-        Series("time", f"d_{name}_high", "2 sigma band", band),
-    )
-    return Chart(f"Innovations of {name}", "time (s)", "observed - forecast (px)", series, note)
-
-
-CHARTS = (
-    _path("Side view", 3, "x3: height (m)", "The flight from the side, and on to the ground."),
-    _path("Top view", 2, "x2: away from camera 2 (m)", "From above; x2 is stretched."),
-    Chart(
-        "What the cameras see",
-        "u: to the right (px)",
-        "v: down (px)",
-        (Series("u1", "v1", "camera 1", "first"), Series("u2", "v2", "camera 2", "second")),
-        note="The whole flight fills a narrow strip of camera 1; camera 2 has eight images.",
-        origin_top_left=True,
-    ),
-    Chart(
-        "Errors of x1, the depth",
-        "time (s)",
-        "estimate - truth (m)",
-        (
-            Series("time", "e_tri_x1", "triangulation", "observation"),
-            Series("time", "e_a_x1", "filter", "line"),
-        ),
-        note="What both cameras knew early, the equation of the flight carries on.",
-    ),
-    _innovations("u1", "first", "An honest filter: 19 of 20 inside the band."),
-    _innovations("v1", "second", "The same for the vertical pixel."),
-    _innovations("u2", "first", "Camera 2: eight images."),
-    _innovations("v2", "second", "The same for its vertical pixel."),
-    Chart(
-        "Where to put the cameras",
-        "theta (rad)",
-        "m",
-        (
-            Series("theta", "H", "H, along", "line"),
-            Series("theta", "V", "V, across", "second line"),
-            Series("theta", "rms_cross", "rms", "free"),
-        ),
-        note="Diagonals of the error diamond, and the rms error: their minima differ.",
-    ),
-    Chart(
-        "A ball lit from the side",
-        "pixel to the right (px)",
-        "brightness",
-        (Series("i_px", "light", "all lines of the image", "observation"),),
-        note="Each point is a pixel. The centre of intensity moves to the light.",
-    ),
-)
 QUESTIONS = (
     Question("d_max", 1, "A pixel sees alpha/R; eight of them must fit into the ball."),
     Question("p1", 1, "Right is -x2 for camera 1; mind the sign."),

@@ -17,50 +17,55 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kfsheet.tennis.dynamics import GRAVITY
-from kfsheet.tennis.inputs import Array, array, number
+from kfsheet.tennis.inputs import Array, array
 
-SERIES = 20  # terms that give phi to rounding for |z| <= 1
+COEFFICIENTS = [1 / factorial(n + 2) for n in reversed(range(18))]
+"""Of phi2; these terms give it to rounding for |z| <= 1."""
 
 
-def phi(order: int, z: ArrayLike) -> Array:
-    """Entire functions phi1(z) = (e^z - 1)/z and phi2(z) = (e^z - 1 - z)/z^2, elementwise.
+def phi(z: ArrayLike) -> tuple[Array, Array]:
+    """Entire functions phi1(z) = (e^z - 1)/z = 1 + z phi2(z) and phi2(z) = (e^z - 1 - z)/z^2.
 
     Parameters
     ----------
-    order : {1, 2}
-        Which of the two.
     z : array_like
-        Complex.
+        Real or complex; the functions are taken elementwise.
     """
-    z = np.asarray(z, complex)
-    series = np.polyval([1 / factorial(n + order) for n in reversed(range(SERIES))], z)
-    far = np.where(np.abs(z) > 1, z, 1)
-    direct = (np.exp(far) - 1) / far if order == 1 else (np.exp(far) - 1 - far) / far**2
-    return np.where(np.abs(z) > 1, direct, series)
+    z = np.asarray(z)
+    far = np.abs(z) > 1
+    second = np.array(np.polyval(COEFFICIENTS, np.where(far, 0, z)))
+    w = z[far]
+    second[far] = (np.exp(w) - 1 - w) / w**2
+    return 1 + z * second, second
 
 
 def closed_form(
     times: ArrayLike,
     X: ArrayLike,
     V: ArrayLike,
-    kappa: float,
+    kappa: ArrayLike,
     spin: ArrayLike,
-    g: float = GRAVITY,
+    g: ArrayLike = GRAVITY,
 ) -> Array:
-    """Positions (n, 3) at times (n,), by (3.5) in its regular form, m.
+    """Positions at times (n,), by (3.5) in its regular form, m.
 
     Parameters
     ----------
     times : array_like
         (n,), s.
     X, V : array_like
-        (3,) position in m and velocity in m/s at t = 0.
-    kappa : float
-        Drag c_D/m, 1/m; it acts with the speed |V| of the start.
+        (..., 3) positions in m and velocities in m/s at t = 0; one ball, or many at once.
+    kappa : array_like
+        (...) drag c_D/m, 1/m; it acts with the speed |V| of the start.
     spin : array_like
-        (3,) lift lambda = c_L Omega/m, 1/s.
-    g : float
-        Gravity, m/s2.
+        (..., 3) lift lambda = c_L Omega/m, 1/s.
+    g : array_like
+        (...) gravity, m/s2.
+
+    Returns
+    -------
+    ndarray
+        (..., n, 3).
 
     Examples
     --------
@@ -69,21 +74,23 @@ def closed_form(
     """
     times, X = array("times", times, (None,)), array("X", X, (3,))
     V, spin = array("V", V, (3,)), array("spin", spin, (3,))
-    decay = number("kappa", kappa) * np.linalg.norm(V)
-    turn = np.linalg.norm(spin)
-    axis = spin / turn if turn else np.array([1.0, 0, 0])
-    down = np.array([0, 0, number("g", g)])
+    decay = array("kappa", kappa, ()) * np.linalg.norm(V, axis=-1)
+    down = array("g", g, ())[..., None] * np.array([0, 0, 1.0])
+    turn = np.linalg.norm(spin, axis=-1)
+    axis = spin / np.where(turn > 0, turn, 1)[..., None]  # 0 without spin: all is across it
+    real = np.multiply.outer(-decay, times)
+    straight = phi(real)
+    turning = phi(real + 1j * np.multiply.outer(turn, times))
 
     def apply(order: int, vector: Array) -> Array:
         """phi(Bt) of a vector: its part along the axis, and the part that turns around it."""
-        straight = phi(order, -decay * times).real
-        turning = phi(order, (-decay + 1j * turn) * times)
-        along = (vector @ axis) * axis
-        across = vector - along
+        along = (vector * axis).sum(axis=-1, keepdims=True) * axis
+        turned = turning[order - 1][..., None]
         return (
-            straight[:, None] * along
-            + turning.real[:, None] * across
-            + turning.imag[:, None] * np.cross(axis, vector)
+            straight[order - 1][..., None] * along[..., None, :]
+            + turned.real * (vector - along)[..., None, :]
+            + turned.imag * np.cross(axis, vector)[..., None, :]
         )
 
-    return X + times[:, None] * apply(1, V) - times[:, None] ** 2 * apply(2, down)
+    t = times[:, None]
+    return X[..., None, :] + t * apply(1, V) - t**2 * apply(2, down)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -38,6 +38,10 @@ class Cones:
         angle = np.arctan(number("radius", radius, 0) / camera.f)
         return cls(np.array(camera.position, float), camera.rays(pixels), float(angle))
 
+    def rows(self, which: Array) -> Cones:
+        """The cones of some photos only."""
+        return replace(self, axes=self.axes[which])
+
     def project(self, x: ArrayLike) -> Array:
         """The nearest points (n, 3) of the cones to points (n, 3).
 
@@ -58,24 +62,38 @@ class Cones:
 
 
 def project_on_both(one: Cones, two: Cones, x: ArrayLike) -> Array:
-    """The nearest points (n, 3) of the intersections of two cones, by Dykstra's algorithm.
+    """The nearest points (n, 3) of the intersections of two cones to points (n, 3).
 
-    Projecting in turn on one and the other would end in *some* common point. Dykstra carries
-    along what each projection took away, and ends in the nearest.
+    Where a photo is missing, its cone is all of space, and the other alone counts.
 
     Raises
     ------
     DataError
-        If two cones do not meet.
+        If the cones of an image do not meet; it is named by its row.
     """
     x = array("x", x, one.axes.shape)
-    taken_1, taken_2 = np.zeros_like(x), np.zeros_like(x)
+    nearest = two.project(one.project(x))
+    both = np.flatnonzero(np.isfinite(one.axes + two.axes).all(axis=-1))
+    if both.size:
+        nearest[both], apart = _dykstra(one.rows(both), two.rows(both), x[both])
+        if apart.max() >= CLOSE:
+            image = both[apart.argmax()]
+            raise DataError(f"the error cones of image {image} do not meet; enlarge the radius")
+    return nearest
+
+
+def _dykstra(one: Cones, two: Cones, x: Array) -> tuple[Array, Array]:
+    """Dykstra's algorithm: the points, and how far they are from lying in both cones.
+
+    Projecting in turn on one and the other would end in *some* common point. Dykstra carries
+    along what each projection took away, and ends in the nearest.
+    """
+    taken_1, taken_2, y = np.zeros_like(x), np.zeros_like(x), x
     for _ in range(ROUNDS):
         y = one.project(x + taken_1)
         taken_1 = x + taken_1 - y
         x = two.project(y + taken_2)
         taken_2 = y + taken_2 - x
         if np.abs(x - y).max() < CLOSE:
-            return x
-    k = int(np.abs(x - y).max(axis=-1).argmax())
-    raise DataError(f"the error cones of image {k} do not meet; make the radius larger")
+            break
+    return x, np.abs(x - y).max(axis=-1)

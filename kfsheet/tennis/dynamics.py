@@ -15,6 +15,7 @@ MASS, DIAMETER, GRAVITY = 0.058, 0.07, 9.8
 """Of the ball in kg and m, and of the place in m/s2."""
 TEXTBOOK_DRAG = 0.22 * DIAMETER**2
 """C_D of a sphere, kg/m; section 3.6.1."""
+AFTER, BEFORE = [1, 2, 0], [2, 0, 1]  # axes of a cross product
 
 
 @dataclass(frozen=True)
@@ -85,9 +86,16 @@ def acceleration(v: ArrayLike, kappa: ArrayLike, spin: ArrayLike, g: ArrayLike) 
     spin : array_like
         Lambda = c_L Omega/m in 1/s, (3,) or (..., 3).
     """
-    v = array("v", v, (3,))
-    speed = np.linalg.norm(v, axis=-1)
-    a = np.cross(np.asarray(spin, float), v) - (np.asarray(kappa) * speed)[..., None] * v
+    v, spin = array("v", v, (3,)), array("spin", spin, (3,))
+    return _push(v, array("kappa", kappa, ()), spin, array("g", g, ()))
+
+
+def _push(v: Array, kappa: Array, spin: Array, g: Array) -> Array:
+    """As :func:`acceleration`, without a look at the arguments: a solver calls it often."""
+    speed = np.sqrt((v * v).sum(axis=-1))
+    # The cross product in full: np.cross would take most of the time of a fit.
+    a = spin[..., AFTER] * v[..., BEFORE] - spin[..., BEFORE] * v[..., AFTER]
+    a -= (kappa * speed)[..., None] * v
     a[..., 2] -= g
     return a
 
@@ -123,6 +131,7 @@ def flights(
     """
     times = np.atleast_1d(array("times", times, (None,)))
     X, V = array("X", X, (None, 3)), array("V", V, (None, 3))
+    kappa, spin, g = array("kappa", kappa, ()), array("spin", spin, (3,)), array("g", g, ())
     way = np.sign(times[-1])
     if (np.diff(times) * way <= 0).any() or times[0] * way < 0 or len(X) != len(V):
         raise DataError("times must move away from 0 in order, and X and V have as many rows")
@@ -131,7 +140,7 @@ def flights(
 
     def rate(_: float, y: Array) -> Array:
         v = y.reshape(len(X), 6)[:, 3:]
-        return np.concatenate([v, acceleration(v, kappa, spin, g)], axis=-1).ravel()
+        return np.concatenate([v, _push(v, kappa, spin, g)], axis=-1).ravel()
 
     start = np.concatenate([X, V], axis=-1).ravel()
     found = solve_ivp(rate, (0, times[-1]), start, "DOP853", t_eval=times, rtol=1e-10, atol=1e-10)
@@ -168,7 +177,7 @@ def impact(ball: Ball, ground: float = DIAMETER / 2, longest: float = 60.0) -> t
         return y[2] - ground
 
     def rate(_: float, y: Array) -> Array:
-        return np.concatenate([y[3:], acceleration(y[3:], ball.kappa, ball.spin, ball.g)])
+        return np.concatenate([y[3:], _push(y[3:], ball.kappa, ball.spin, ball.g)])
 
     height.terminal, height.direction = True, -1
     start = np.concatenate([ball.X, ball.V])

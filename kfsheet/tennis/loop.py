@@ -75,16 +75,10 @@ def into_cones(shot: Shot, x: Array, radius: float) -> Array:
     radius : float
         Of the cones, px.
     """
-    cameras, pixels = (
-        (shot.scene.camera_1, shot.scene.camera_2),
-        (shot.pixels_1, shot.pixels_2),
-    )
-    one, two = (Cones.of(c, p, radius) for c, p in zip(cameras, pixels, strict=True))
-    both = shot.overlap
-    moved = two.project(one.project(x))  # in most images one of the two is all of space
-    pair = (Cones(c.apex, c.axes[both], c.half_angle) for c in (one, two))
-    moved[both] = project_on_both(*pair, x[both])
-    return moved
+    scene = shot.scene
+    one = Cones.of(scene.camera_1, shot.pixels_1, radius)
+    two = Cones.of(scene.camera_2, shot.pixels_2, radius)
+    return project_on_both(one, two, x)
 
 
 def weights(shot: Shot, x: Array) -> Array:
@@ -127,6 +121,20 @@ def _vector(ball: Ball) -> Array:
     return np.concatenate([ball.X, ball.V, ball.spin, [ball.kappa, ball.g]]) / SCALE
 
 
+def _positions(times: Array, vectors: Array) -> Array:
+    """(3.5) for vectors (..., 11) of scaled parameters: (..., 3n), image by image."""
+    p = vectors * SCALE
+    x = closed_form(times, p[..., :3], p[..., 3:6], p[..., 9], p[..., 6:9], p[..., 10])
+    return x.reshape(*p.shape[:-1], -1)
+
+
+def _derivative(function: Callable[[Array], Array], p: Array) -> Array:
+    """Central differences of a function that takes many vectors at once."""
+    step = STEP * np.eye(len(p))
+    ahead, behind = np.split(function(np.concatenate([p + step, p - step])), 2)
+    return (ahead - behind).T / (2 * STEP)
+
+
 def fit_closed_form(times: Array, x: Array, w: Array, start: Ball) -> Ball:
     """Weighted least squares of (3.5) in eleven parameters: X, V, lambda, c_D/m and g.
 
@@ -137,14 +145,16 @@ def fit_closed_form(times: Array, x: Array, w: Array, start: Ball) -> Ball:
     start : Ball
         Where to begin.
     """
-    root = np.sqrt(w)[:, None]
+    root = np.repeat(np.sqrt(w), 3)
 
     def residuals(p: Array) -> Array:
-        p = p * SCALE
-        return ((closed_form(times, p[:3], p[3:6], p[9], p[6:9], p[10]) - x) * root).ravel()
+        return (_positions(times, p) - x.ravel()) * root
+
+    def jacobian(p: Array) -> Array:
+        return _derivative(lambda many: _positions(times, many), p) * root[:, None]
 
     p = _vector(start)
-    p = least_squares(residuals, p, method="lm", xtol=1e-12, ftol=1e-12).x * SCALE
+    p = least_squares(residuals, p, jacobian, method="lm", xtol=1e-12, ftol=1e-12).x * SCALE
     return Ball(p[:3], p[3:6], p[9], p[6:9], p[10])
 
 
@@ -222,22 +232,16 @@ def modes(shot: Shot, ball: Ball) -> Array:
     rays = Cones.of(shot.scene.camera_1, shot.pixels_1, THIN)
     both, seen = shot.overlap, shot.triangulated()
 
-    def positions(p: Array) -> Array:
-        p = p * SCALE
-        return closed_form(shot.times, p[:3], p[3:6], p[9], p[6:9], p[10])
-
-    def believed(p: Array) -> Array:
-        x = rays.project(positions(p))
-        x[both] = seen[both]
-        return x
-
-    def derivative(function: Callable[[Array], Array], p: Array) -> Array:
-        steps = STEP * np.eye(len(p))
-        pairs = [(function(p + e) - function(p - e)).ravel() for e in steps]
-        return np.array(pairs).T / (2 * STEP)
+    def believed(vectors: Array) -> Array:
+        x = _positions(shot.times, vectors).reshape(len(vectors), -1, 3)
+        moved = np.stack([rays.project(one) for one in x])
+        moved[:, both] = seen[both]
+        return moved.reshape(len(x), -1)
 
     p = _vector(ball)
-    root = np.repeat(np.sqrt(weights(shot, positions(p))), 3)[:, None]
-    J, D = (derivative(function, p) * root for function in (positions, believed))
+    x = _positions(shot.times, p).reshape(-1, 3)
+    root = np.repeat(np.sqrt(weights(shot, x)), 3)[:, None]
+    J = _derivative(lambda many: _positions(shot.times, many), p) * root
+    D = _derivative(believed, p) * root
     values = np.linalg.eigvals(np.linalg.lstsq(J, D, rcond=None)[0])
     return np.sort(np.abs(values))[::-1]

@@ -5,6 +5,7 @@ No depth is invented for a photo that one camera alone took: each pixel is one e
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,8 +14,8 @@ from scipy.optimize import least_squares
 
 from kfsheet.errors import DataError
 from kfsheet.tennis.dynamics import GRAVITY, MASS, TEXTBOOK_DRAG, Ball, flights
-from kfsheet.tennis.inputs import Array, array
-from kfsheet.tennis.shots import Shot
+from kfsheet.tennis.inputs import Array, array, number
+from kfsheet.tennis.shots import SIGMA, Shot
 
 SPINS = {"none": 0, "across": 2, "full": 3}
 """Free components of lambda: none; the two across V, as the report advises; all three."""
@@ -57,7 +58,9 @@ class _Unknowns:
         return {name: n for name, n in {**sizes, "g": int(self.g is None)}.items() if n}
 
     def vector(self, ball: Ball) -> Array:
-        values = {"X": ball.X, "V": ball.V, "kappa": ball.kappa, "g": ball.g, "spin": 0.0}
+        values = {"X": ball.X, "V": ball.V, "kappa": ball.kappa, "g": ball.g, "spin": ball.spin}
+        if self.blocks.get("spin") == SPINS["across"]:
+            values["spin"] = [side @ ball.spin for side in _sides(ball.V)]
         return np.concatenate(
             [np.full(n, values[name]) / SCALES[name] for name, n in self.blocks.items()]
         )
@@ -83,19 +86,63 @@ class _Unknowns:
         if "spin" not in free:
             known = np.zeros(3) if isinstance(self.spin, str) else self.spin
             return np.broadcast_to(known, free["V"].shape)
-        return _across(free["V"], free["spin"]) if self.spin == "across" else free["spin"]
+        if self.spin == "full":
+            return free["spin"]
+        level, up = _sides(free["V"])
+        return free["spin"][:, :1] * level + free["spin"][:, 1:] * up
 
     def ball(self, vector: Array) -> Ball:
         X, V, kappa, spin, g = self.balls(vector[None])
         return Ball(X[0], V[0], kappa[0], spin[0], g[0])
 
 
-def _across(V: Array, parts: Array) -> Array:
-    """Lambda of two components that stand across V, the first of them horizontal."""
+def _sides(V: Array) -> tuple[Array, Array]:
+    """Two unit vectors across velocities (..., 3) and each other, the first of them horizontal."""
     level = np.cross(V, [0, 0, 1.0])
-    level /= np.linalg.norm(level, axis=1, keepdims=True)
-    up = np.cross(level, V) / np.linalg.norm(V, axis=1, keepdims=True)
-    return parts[:, :1] * level + parts[:, 1:] * up
+    level /= np.linalg.norm(level, axis=-1, keepdims=True)
+    return level, np.cross(level, V) / np.linalg.norm(V, axis=-1, keepdims=True)
+
+
+@dataclass(frozen=True)
+class _Model:
+    """What a shot would show, as a function of the vector of the optimiser."""
+
+    shot: Shot
+    unknowns: _Unknowns
+
+    @classmethod
+    def of(cls, shot: Shot, kappa: float | None, spin: str | ArrayLike, g: float | None) -> _Model:
+        if isinstance(spin, str) and spin not in SPINS:
+            raise DataError(f"spin is {spin!r}; it must be one of {', '.join(SPINS)}, or known")
+        spin = spin if isinstance(spin, str) else array("spin", spin, (3,))
+        model = cls(shot, _Unknowns(kappa, spin, g))
+        if model.observed.size < (n := sum(model.unknowns.blocks.values())):
+            raise DataError(f"{model.observed.size} pixels cannot tell {n} unknowns")
+        return model
+
+    @property
+    def observed(self) -> Array:
+        """Pixel coordinates (n,) of the photos that there are."""
+        both = np.stack([self.shot.pixels_1, self.shot.pixels_2])
+        return both[np.isfinite(both)]
+
+    def positions(self, vectors: Array) -> Array:
+        """(k, images, 3) for vectors (k, unknowns)."""
+        return flights(self.shot.times, *self.unknowns.balls(vectors))[..., :3]
+
+    def pixels(self, vectors: Array) -> Array:
+        """(k, n) pixels that should have been observed."""
+        shot, x = self.shot, self.positions(vectors)
+        cameras = (shot.scene.camera_1, shot.scene.camera_2)
+        seen = np.isfinite(np.stack([shot.pixels_1, shot.pixels_2]))
+        return np.stack([camera.image(x) for camera in cameras], axis=1)[:, seen]
+
+
+def _derivative(function: Callable[[Array], Array], p: Array) -> Array:
+    """Central differences (..., unknowns); all moved balls fly together, in one call."""
+    step = STEP * np.eye(len(p))
+    ahead, behind = np.split(function(np.concatenate([p + step, p - step])), 2)
+    return np.moveaxis(ahead - behind, 0, -1) / (2 * STEP)
 
 
 def start_from_overlap(shot: Shot) -> Ball:
@@ -142,31 +189,59 @@ def fit_pixels(
     DataError
         If there are fewer pixels than unknowns, or ``spin`` is another word.
     """
-    if isinstance(spin, str) and spin not in SPINS:
-        raise DataError(f"spin is {spin!r}; it must be one of {', '.join(SPINS)}, or known")
-    spin = spin if isinstance(spin, str) else array("spin", spin, (3,))
-    unknowns = _Unknowns(kappa, spin, g)
-    p = unknowns.vector(start or start_from_overlap(shot))
-    observed = np.stack([shot.pixels_1, shot.pixels_2])
-    seen = np.isfinite(observed)
-    if seen.sum() < len(p):
-        raise DataError(f"{seen.sum()} pixels cannot tell {len(p)} unknowns")
-
-    def residuals(vectors: Array) -> Array:
-        x = flights(shot.times, *unknowns.balls(vectors))[..., :3]
-        cameras = (shot.scene.camera_1, shot.scene.camera_2)
-        pixels = np.stack([camera.image(x) for camera in cameras], axis=1)
-        return pixels[:, seen] - observed[seen]
-
-    def jacobian(p: Array) -> Array:
-        # All moved balls fly together, in one call of the solver.
-        step = STEP * np.eye(len(p))
-        ahead, behind = np.split(residuals(np.concatenate([p + step, p - step])), 2)
-        return (ahead - behind).T / (2 * STEP)
-
+    model = _Model.of(shot, kappa, spin, g)
+    p, observed = model.unknowns.vector(start or start_from_overlap(shot)), model.observed
     found = least_squares(
-        lambda p: residuals(p[None])[0], p, jacobian, method="lm", xtol=1e-12, ftol=1e-12
+        lambda p: model.pixels(p[None])[0] - observed,
+        p,
+        lambda p: _derivative(model.pixels, p),
+        method="lm",
+        xtol=1e-12,
+        ftol=1e-12,
     )
     rms = float(np.sqrt(np.mean(found.fun**2)))
     spread = rms * np.sqrt(np.diag(np.linalg.pinv(found.jac.T @ found.jac)))
-    return Fit(unknowns.ball(found.x), rms, unknowns.split(spread))
+    return Fit(model.unknowns.ball(found.x), rms, model.unknowns.split(spread))
+
+
+def path_covariance(
+    shot: Shot,
+    ball: Ball,
+    *,
+    sigma: float = SIGMA,
+    kappa: float | None = None,
+    spin: str | ArrayLike = "full",
+    g: float | None = GRAVITY,
+) -> Array:
+    """How well :func:`fit_pixels` can know the path, before any photo is taken.
+
+        C = sigma^2 D (J'J)^-1 D',   J = d pixels / d unknowns,   D = d positions / d unknowns
+
+    To first order no unbiased estimate does better (Cramer and Rao).
+
+    Parameters
+    ----------
+    shot : Shot
+        Cameras and times, and which photos there are; their values do not matter.
+    ball : Ball
+        The true flight, at which the derivatives are taken.
+    sigma : float
+        Error of a pixel coordinate, px.
+    kappa, spin, g
+        What is free and what is known, as for :func:`fit_pixels`.
+
+    Returns
+    -------
+    ndarray
+        (3, images, images): the covariance of each coordinate along the path, m2.
+
+    Raises
+    ------
+    DataError
+        As :func:`fit_pixels`.
+    """
+    model = _Model.of(shot, kappa, spin, g)
+    p = model.unknowns.vector(ball)
+    J, D = _derivative(model.pixels, p), _derivative(model.positions, p)
+    inverse = number("sigma", sigma, 0) ** 2 * np.linalg.inv(J.T @ J)
+    return np.einsum("ikp,pq,jkq->kij", D, inverse, D)

@@ -83,6 +83,4 @@ def add_centroid(m: Recurrence, section: str = "Centroid") -> None:
         found = m.summary(
             f"{name}_centroid", SumProduct(w, at) / Sum(w), "px", f"centre of intensity, {words}"
         )
-        m.summary(
-            f"shift_{name}", (found - centre) / R, "", f"its shift to the {words} over radius"
-        )
+        m.summary(f"shift_{name}", (found - centre) / R, "", f"its shift over the radius, {words}")

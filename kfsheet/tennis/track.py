@@ -1,10 +1,10 @@
-"""The two lines of sight, and the flight to the ground, as worksheets; and (3.1) in symbols."""
+"""Lines of sight, the start of the filter, and the flight to the ground, as worksheets."""
 
 from __future__ import annotations
 
-from sympy import Expr, Matrix, Min, sqrt
+from sympy import Expr, Matrix, Min, S, floor, sqrt
 
-from kfsheet.expressions import RMS, Last, t, when_observed
+from kfsheet.expressions import RMS, Count, Last, Mean, Sum, SumProduct, t, when_observed
 from kfsheet.recurrence import Recurrence
 
 AXES = {1: "away from camera 1", 2: "away from camera 2", 3: "up"}
@@ -50,11 +50,13 @@ def add_triangulation(m: Recurrence) -> None:
     a11, a12, a22, b1, b2 = (column[t] for column in m.columns(*products, section=page))
     for name, (rule, unit, words) in products.items():
         m.define(m[name][t], when_observed(both, rule), unit, words)
-    s1, s2 = m.columns("s1", "s2", section=page)
-    known, spread = (a11, a12, a22, b1, b2), a11 * a22 - a12**2
-    rule_1, rule_2 = (a22 * b1 - a12 * b2) / spread, (a12 * b1 - a11 * b2) / spread
-    m.define(s1[t], when_observed(known, rule_1), "m", "how far along line 1 the closest point is")
-    m.define(s2[t], when_observed(known, rule_2), "m", "the same for line 2")
+    det, s1, s2 = m.columns("a_det", "s1", "s2", section=page)
+    squares = when_observed((a11, a12, a22), a11 * a22 - a12**2)
+    m.define(det[t], squares, "", "determinant: 0 if the lines are parallel")
+    first = when_observed((a12, a22, b1, b2, det[t]), (a22 * b1 - a12 * b2) / det[t])
+    m.define(s1[t], first, "m", "how far along line 1 the closest point is")
+    second = when_observed((a11, a12, b1, b2, det[t]), (a12 * b1 - a11 * b2) / det[t])
+    m.define(s2[t], second, "m", "the same for line 2")
     ends = {}
     for k, corner, line, s in ((1, c1, one, s1), (2, c2, two, s2)):
         for n in AXES:
@@ -67,10 +69,55 @@ def add_triangulation(m: Recurrence) -> None:
         (x,) = m.columns(f"x{n}_tri", section=page)
         pair = (ends[1, n], ends[2, n])
         m.define(x[t], when_observed(pair, sum(pair) / 2), "m", f"triangulated, {words}")
+    apart = m.columns(*(f"apart_{n}" for n in AXES), section=page)
+    for n, column in zip(AXES, apart, strict=True):
+        pair = (ends[1, n], ends[2, n])
+        m.define(column[t], when_observed(pair, pair[0] - pair[1]), "m", f"line 1 - line 2, x{n}")
     (gap,) = m.columns("gap", section=page)
-    apart = [ends[1, n] - ends[2, n] for n in AXES]
-    m.define(gap[t], when_observed(tuple(ends.values()), length(apart)), "m", "between the lines")
+    between = [column[t] for column in apart]
+    m.define(gap[t], when_observed(tuple(between), length(between)), "m", "between the lines")
     m.summary("rms_gap", RMS(gap), "m", "root mean square of the gap")
+
+
+def add_start(m: Recurrence) -> None:
+    """Position and velocity at t = 0 from a parabola through the triangulated points.
+
+    The slope through points at even times is the velocity at their middle; drag, spin and gravity
+    at that velocity bend the parabola. The filter meets the same pixels again in their images; the
+    start is claimed to be so much worse than they are that counting them twice does no harm.
+    """
+    when, off = m.columns("time_tri", "time_off", section="Triangulation")
+    seen = when_observed(m["x1_tri"][t], m.clock.base[t])
+    m.define(when[t], seen, "s", "time of the image, where both cameras have it")
+    n = m.summary("n_tri", Count(when), "", "images that both cameras have")
+    t_m = m.summary("t_mid", Mean(when), "s", "middle of their times")
+    # Times since the middle: sums of products of times since 0 would cancel, and lose digits.
+    m.define(off[t], when_observed(when[t], when[t] - t_m), "s", "time since the middle of those")
+    spread = m.summary("t_var", SumProduct(off, off) / n, "s2", "variance of those times")
+    middle, slope = [], []
+    for k in AXES:
+        x = m[f"x{k}_tri"]
+        middle.append(m.summary(f"x{k}_mid", Mean(x), "m", f"mean of x{k}_tri"))
+        # The times since the middle sum up to rounding errors only; they must not meet 5 m.
+        both = SumProduct(off, x) - Sum(off) * middle[-1]
+        both = m.summary(f"tx{k}_mid", both, "m*s", f"sum of time times x{k}, from their means")
+        rule = both / (n * spread)
+        slope.append(m.summary(f"v{k}_mid", rule, "m/s", f"slope of x{k}_tri"))
+    for k, bend in zip(AXES, push(m, slope, length(slope)), strict=True):
+        a = m.summary(f"a{k}_mid", bend, "m/s2", f"acceleration {k} at that velocity")
+        level = middle[k - 1] - slope[k - 1] * t_m + a * (t_m**2 - spread) / 2
+        m.summary(f"x{k}_0", _rounded(level, m["s_x"], m["n_round"]), "m", f"start, x{k}")
+        speed = _rounded(slope[k - 1] - a * t_m, m["s_v"], m["n_round"])
+        m.summary(f"v{k}_0", speed, "m/s", f"start, velocity {k}")
+
+
+def _rounded(value: Expr, error: Expr, parts: Expr) -> Expr:
+    """To a fraction of the error that is claimed: it claims no more.
+
+    Programs add in different orders. Rounded, the start is the same in all of them to the last
+    digit, which an innovation, a small difference of large pixels, would otherwise magnify.
+    """
+    return floor(parts * value / error + S.Half) * error / parts
 
 
 def add_flight(m: Recurrence) -> None:
