@@ -152,10 +152,14 @@ class _Task:
 
 @dataclass
 class _Sums:
-    """Counts, sums and sums of squares over members, and the members' scalars."""
+    """Counts, means and squared deviations from them over members; and the members' scalars.
+
+    Deviations, not squares: of a distance of kilometres that varies by millimetres, the squares
+    would keep no figure of the variance.
+    """
 
     count: np.ndarray
-    total: np.ndarray
+    mean: np.ndarray
     squares: np.ndarray
     scalars: np.ndarray
 
@@ -164,16 +168,22 @@ class _Sums:
         """Sums over the first axis, values that are missing left out."""
         missing = np.isnan(values)
         if not missing.any():
-            count = np.full(values.shape[1:], len(values))
-            return cls(count, values.sum(axis=0), (values * values).sum(axis=0), scalars)
-        there = ~missing
-        filled = np.where(there, values, 0.0)
-        return cls(there.sum(axis=0), filled.sum(axis=0), (filled**2).sum(axis=0), scalars)
+            mean = values.mean(axis=0)
+            count = np.full(mean.shape, len(values))
+            return cls(count, mean, ((values - mean) ** 2).sum(axis=0), scalars)
+        count = len(values) - missing.sum(axis=0)
+        mean = np.where(missing, 0.0, values).sum(axis=0) / np.maximum(count, 1)
+        far = np.where(missing, 0.0, values - mean)
+        return cls(count, mean, (far**2).sum(axis=0), scalars)
 
     def add(self, other: _Sums) -> None:
-        """Add another group's."""
-        self.count, self.total = self.count + other.count, self.total + other.total
-        self.squares = self.squares + other.squares
+        """Add another group's (Chan, Golub and LeVeque, 1979)."""
+        count = self.count + other.count
+        share = other.count / np.maximum(count, 1)
+        far = other.mean - self.mean
+        self.squares = self.squares + other.squares + far**2 * self.count * share
+        self.mean = self.mean + far * share
+        self.count = count
         self.scalars = np.concatenate([self.scalars, other.scalars])
 
 
@@ -483,21 +493,20 @@ def _study(
 
     rows = {
         name: pd.DataFrame(
-            _statistics(sums.count[k], sums.total[k], sums.squares[k]),
+            _statistics(sums.count[k], sums.mean[k], sums.squares[k]),
             index=pd.RangeIndex(model.rows, name=model.step),
         )
         for k, name in enumerate(names)
     }
     whole = _Sums.of(sums.scalars, sums.scalars)
-    table = pd.DataFrame(_statistics(whole.count, whole.total, whole.squares), index=scalars)
+    table = pd.DataFrame(_statistics(whole.count, whole.mean, whole.squares), index=scalars)
     for q in quantiles:
         table[f"{q:.4g} quantile"] = np.nanquantile(sums.scalars, q, axis=0)
     return Study(members, rows, table)
 
 
-def _statistics(count: np.ndarray, total: np.ndarray, squares: np.ndarray) -> dict[str, np.ndarray]:
+def _statistics(count: np.ndarray, mean: np.ndarray, squares: np.ndarray) -> dict[str, np.ndarray]:
     with np.errstate(invalid="ignore", divide="ignore"):
-        mean, mean_square = total / count, squares / count
-        spread = np.maximum(mean_square - mean**2, 0) * count / (count - 1)
-        found = (mean, np.sqrt(mean_square), np.sqrt(spread), count)
+        mean = np.where(count > 0, mean, np.nan)
+        found = (mean, np.sqrt(mean**2 + squares / count), np.sqrt(squares / (count - 1)), count)
         return dict(zip(STATISTICS, found, strict=True))

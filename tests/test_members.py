@@ -225,6 +225,23 @@ def test_quantiles_of_scalars_are_those_of_the_members(photos):
     np.testing.assert_allclose(found, np.quantile(values, [0.05, 0.5]), rtol=1e-12)
 
 
+def test_a_small_spread_about_a_large_mean_keeps_its_figures(monkeypatch):
+    """Millimetres about a thousand kilometres, in groups that have other means."""
+    from kfsheet import members
+
+    monkeypatch.setattr(members, "MOST", 16)
+    m = Recurrence("far", title="Far away")
+    x = m.data("x", [0.0, 0.0], "m", "given", section="S")
+    (y,) = m.columns("y", section="S")
+    m.define(y[t], x[t] + 0, "m", "seen")
+    values = 1e6 + 1e-3 * np.random.RandomState(3).standard_normal((50, 2))
+    values[:, 1] = 1e6
+    found = evaluate(m, {"x": values}, members=50, columns=["y"], scalars=()).rows["y"]
+    assert found["std"][0] == pytest.approx(np.std(values[:, 0] - 1e6, ddof=1), rel=1e-6)
+    assert found["std"][1] == 0
+    np.testing.assert_allclose(found["rms"], np.sqrt(np.mean(values**2, axis=0)), rtol=1e-15)
+
+
 def executors():
     yield "one thread", lambda: ThreadPoolExecutor(1)
     yield "processes", lambda: ProcessPoolExecutor(2, mp_context=get_context("spawn"))

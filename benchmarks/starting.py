@@ -1,0 +1,43 @@
+"""What a user waits for before anything happens."""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+
+from measuring import Line, seconds
+
+import kfsheet as kf
+
+
+def lines() -> Iterator[Line]:
+    """Each in a process of its own, as a user starts it."""
+    for what, code, goal in (
+        ("kfsheet --help", "from kfsheet.cli import parser; parser().format_help()", "under 0.3 s"),
+        ("import kfsheet", "import kfsheet", "under 0.6 s"),
+    ):
+        yield Line(what, seconds(lambda code=code: python(code)), 0, goal)
+    yield Line("a dense 9-state model to columns", seconds(nine_states, repeats=3), 0, "under 2 s")
+
+
+def python(code: str) -> None:
+    """Run a program."""
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def nine_states() -> None:
+    """Nine states, all coupled, three observations."""
+    from sympy import Matrix, Symbol, eye
+
+    m = kf.Recurrence("nine", title="Nine states", rows=3)
+    a = m.parameter("a", 0.1, "", "coupling")
+    names = [Symbol(f"s{k}_", real=True) for k in range(9)]
+    state = {s: kf.State("", f"element {k}", 0, 1) for k, s in enumerate(names)}
+    x = Matrix(names)
+    A = eye(9) + a * Matrix(9, 9, lambda i, j: 1 if abs(int(i) - int(j)) < 2 else 0)
+    seen = [
+        kf.Observation(
+            f"y{k}", m.data(f"y_{k}", [0, 0, 0], "", "seen", section="D")[kf.t], s, 1, ""
+        )
+        for k, s in enumerate(names[:3])
+    ]
+    kf.add_filter(m, kf.StateSpace(state, list(A * x), eye(9) * a, seen), section="Filter")

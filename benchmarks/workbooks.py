@@ -1,0 +1,126 @@
+"""Writing, checking and recalculating workbooks."""
+
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from functools import cache
+from importlib.util import find_spec
+from io import BytesIO
+from pathlib import Path
+
+import openpyxl
+from measuring import Line, seconds
+
+import kfsheet as kf
+from kfsheet.excel.package import strip_values
+from kfsheet.excel.recalculate import convert, libreoffice, recalculate
+from kfsheet.excel.workbook import workbook_bytes
+from kfsheet.exercises.cannonball import exercise as cannonball
+from kfsheet.exercises.football import exercise as football
+
+HERE = Path(__file__).parent
+
+
+def lines() -> Iterator[Line]:
+    """The cannon-ball's workbook, a long one, and what other engines need."""
+    content = workbook_bytes(cannonball)
+    count = sum(len(row) for sheet in texts(content) for row in sheet)
+    yield Line(
+        f"write the cannon-ball, {count:,} cells: openpyxl, bare strings",
+        seconds(lambda: workbook_bytes(cannonball), repeats=3),
+        seconds(lambda: bare_strings(content), repeats=3),
+        "0.77 (within 1.3)",
+    )
+    yield from growth()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "cannonball.xlsx"
+        path.write_bytes(content)
+        yield from checking(path)
+        yield from engines(path)
+
+
+def growth() -> Iterator[Line]:
+    """A filter of two states in a table of 10,000 rows, and of 100,000."""
+    (small, _), (large, memory) = written(10_000), written(100_000)
+    words = f"10 is linear; at most {memory:.0f} MB (under 1,000)"
+    yield Line("write 10,000 rows of 18 columns: 100,000 rows", small, large, words)
+
+
+def written(rows: int) -> tuple[float, float]:
+    """Seconds and peak megabytes of writing a long table, in a process of its own."""
+    program = [sys.executable, str(HERE / "long_table.py"), str(rows)]
+    done = subprocess.run(program, capture_output=True, text=True, check=True)
+    time, memory = map(float, done.stdout.split())
+    return time, memory
+
+
+def checking(path: Path) -> Iterator[Line]:
+    """``kfsheet check``: two recalculations and every formula cell beside NumPy."""
+    report = kf.check_workbook(path, cannonball)
+    yield Line(
+        f"check its {report.cells:,} formulas with IronCalc",
+        seconds(lambda: kf.check_workbook(path, cannonball), repeats=3),
+        0,
+        "2 s wanted; not met",
+    )
+    program = [sys.executable, "-m", "kfsheet", "check", str(path)]
+
+    def command() -> None:
+        subprocess.run(program, capture_output=True, check=True)
+
+    yield Line("the same as a command, start included", seconds(command, repeats=3))
+
+
+def engines(path: Path) -> Iterator[Line]:
+    """IronCalc beside other engines that recalculate the same files."""
+    ours = seconds(lambda: recalculate(path), repeats=3)
+    bare = path.parent / "bare.xlsx"
+    strip_values(path, bare)
+    if libreoffice():
+        kind = "xlsx:Calc MS Excel 2007 XML"
+        other = seconds(lambda: convert(bare, path.parent / "out", kind), repeats=3)
+        words = "opens, recalculates and saves in under 5 s"
+        yield Line("recalculate it: LibreOffice", ours, other, words)
+    if find_spec("formualizer"):
+        other = seconds(lambda: by_formualizer(bare), repeats=3)
+        yield Line("recalculate it: formualizer", ours, other)
+    if find_spec("formulas"):
+        small = path.parent / "football.xlsx"
+        small.write_bytes(workbook_bytes(football))
+        times = seconds(lambda: recalculate(small)), seconds(lambda: by_formulas(small), repeats=1)
+        yield Line("recalculate the football, 1,188 formulas: formulas", *times)
+
+
+def by_formualizer(path: Path) -> object:
+    """Load and evaluate with formualizer."""
+    import formualizer
+
+    return formualizer.load_workbook(str(path)).evaluate_all()
+
+
+def by_formulas(path: Path) -> object:
+    """Load and evaluate with formulas."""
+    import formulas
+
+    return formulas.ExcelModel().loads(str(path)).finish().calculate()
+
+
+@cache
+def texts(content: bytes) -> list[list[list[str]]]:
+    """Cells of a workbook as strings that are no formulas."""
+    book = openpyxl.load_workbook(BytesIO(content))
+    return [
+        [["" if v is None else str(v).lstrip("=") for v in row] for row in sheet.values]
+        for sheet in book
+    ]
+
+
+def bare_strings(content: bytes) -> None:
+    """Write the formulas of a workbook as plain strings: what openpyxl costs at least."""
+    book = openpyxl.Workbook()
+    for rows in texts(content):
+        sheet = book.create_sheet()
+        for row in rows:
+            sheet.append(row)
+    book.save(BytesIO())
