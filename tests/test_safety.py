@@ -19,6 +19,7 @@ from kfsheet.coursework.grading import STATUSES
 from kfsheet.coursework.handout import handout_bytes
 from kfsheet.coursework.submission import read_submission
 from kfsheet.coursework.workers import Failed, Pool
+from kfsheet.coursework.worksheet import Formula
 
 FUZZED = 2_000
 EXERCISE = load_exercise("football")
@@ -315,5 +316,5 @@ def test_a_changed_formula_gets_full_marks_only_if_an_engine_agrees(good, tmp_pa
 def test_the_reader_keeps_no_stored_value(good):
     book = read_submission(good)
     answers = {book.sheets["Reanalysis"][row, 7] for row in range(4, 20)}
-    assert all(isinstance(a, submission.Formula) for a in answers)
+    assert all(isinstance(a, Formula) for a in answers)
     assert do.SECRET

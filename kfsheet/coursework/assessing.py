@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from kfsheet.coursework import tokens
+from kfsheet.coursework.diagnosis import EMPTY
 from kfsheet.coursework.edits import edits
 from kfsheet.coursework.handout import TOKEN_PROPERTY
-from kfsheet.coursework.judge import EMPTY, Judge, Mark
+from kfsheet.coursework.judge import Judge, Mark
 from kfsheet.coursework.marking import mark_workbook
 from kfsheet.coursework.places import named_cell
 from kfsheet.coursework.questions import TOKEN_NAME

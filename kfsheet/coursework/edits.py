@@ -11,7 +11,8 @@ from openpyxl.utils import get_column_letter
 from kfsheet.coursework.judge import asked_steps
 from kfsheet.coursework.meaning import Interpreter, Meaning
 from kfsheet.coursework.places import Places
-from kfsheet.coursework.submission import Book, Content, Formula
+from kfsheet.coursework.submission import Book
+from kfsheet.coursework.worksheet import Content, Formula
 from kfsheet.coursework.worlds import Own
 from kfsheet.errors import FormulaError
 from kfsheet.excel.compose import Run, section_page

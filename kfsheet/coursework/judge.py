@@ -6,21 +6,34 @@ that cannot be read as mathematics is handed to ``recalculated``, which asks a s
 
 from __future__ import annotations
 
-import hashlib
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import pairwise
 
 from openpyxl.utils import get_column_letter
 from sympy import Basic, Indexed
 
-from kfsheet.coursework.comparing import Question, question
+from kfsheet.coursework.diagnosis import (
+    EMPTY,
+    GAPS,
+    GONE,
+    HARD_CODED,
+    PARTLY,
+    PLAIN_WORDS,
+    REFUSED,
+    RIGHT,
+    ROUNDED,
+    TYPED,
+    UNREADABLE,
+    WRONG,
+    diagnose,
+    is_right,
+)
 from kfsheet.coursework.meaning import Interpreter, parsed
-from kfsheet.coursework.mutations import MOST, mutations
 from kfsheet.coursework.places import Places
-from kfsheet.coursework.submission import Book, Formula
+from kfsheet.coursework.submission import Book
+from kfsheet.coursework.worksheet import Formula
 from kfsheet.coursework.worlds import Own, Scene
 from kfsheet.errors import FormulaError
 from kfsheet.excel.layout import Address
@@ -30,9 +43,6 @@ from kfsheet.exercise import Question as Asked
 from kfsheet.expressions import Aggregate, Missing, lag, t
 from kfsheet.recurrence import Recurrence
 
-RIGHT, EMPTY, TYPED, WRONG = "right", "empty", "typed", "wrong"
-HARD_CODED, PARTLY, GAPS, ROUNDED = "hard-coded", "partly right", "gaps forgotten", "rounded"
-REFUSED, UNREADABLE, GONE = "refused", "unreadable", "gone"
 CREDIT = {RIGHT: 1.0, HARD_CODED: 0.5, PARTLY: 0.5, GAPS: 0.5, ROUNDED: 0.5}
 """Share of the points by status; what is not listed gets none."""
 DANGEROUS = frozenset(
@@ -220,14 +230,6 @@ class Judge:
         return ", ".join(dict.fromkeys(shown)) or "a fixed row"
 
 
-PLAIN_WORDS = {
-    EMPTY: "empty",
-    TYPED: "a number stands where a formula is asked for; it will not move with the parameters",
-    UNREADABLE: "the formula could not be judged",
-    WRONG: "the formula gives another value than the right one",
-}
-
-
 def _decided(cell: Cell, found: dict[int, bool]) -> Cell:
     if cell.status != UNREADABLE or cell.step not in found:
         return cell
@@ -262,65 +264,6 @@ def _judged_in(model: Recurrence, name: str, step: int) -> list[int]:
     if step < starts:
         return [step]
     return sorted({starts, (starts + model.rows - 1) // 2, model.rows - 1})
-
-
-@lru_cache(maxsize=200_000)
-def is_right(scene: Scene, name: str, step: int, expression: Basic) -> bool:
-    """Whether an expression is the key's function in a step."""
-    return question(scene, name, step).same(expression)
-
-
-@lru_cache(maxsize=20_000)
-def diagnose(
-    scene: Scene, name: str, step: int, expression: Basic, own: Own
-) -> tuple[str, str, str]:
-    """Status, words and fingerprint of a wrong formula."""
-    asked = question(scene, name, step)
-    values = asked.values(expression)
-    fingerprint = hashlib.sha256("/".join((name, *values)).encode()).hexdigest()[:12]
-    parameters = Own(own.parameters)
-    if asked.same(expression, parameters):
-        names = ", ".join(_still(asked, expression, own)) or "a parameter"
-        words = f"right only as long as {names} keeps its value: a number stands in its place"
-        return HARD_CODED, words, fingerprint
-    if asked.same(expression, gaps=False):
-        words = "right where there is an observation, wrong where one is missing"
-        return GAPS, words, fingerprint
-    if asked.same(expression, own):
-        return HARD_CODED, "a number from the data stands where its cell belongs", fingerprint
-    if asked.nearly(expression):
-        return ROUNDED, "nearly right: a constant in it is rounded", fingerprint
-    return WRONG, _words_of(scene, name, step, expression, values), fingerprint
-
-
-def _still(asked: Question, expression: Basic, own: Own) -> list[str]:
-    """Parameters that the formula should follow and does not."""
-    found = []
-    for name, _ in own.parameters:
-        others = Own(tuple(p for p in own.parameters if p[0] != name))
-        if not asked.same(expression, others):
-            found.append(name)
-    return found
-
-
-def _words_of(scene: Scene, name: str, step: int, expression: Basic, values: Sequence[str]) -> str:
-    if name in scene.model.table and expression.has(scene.model[name][t]):
-        return "the formula refers to its own cell"
-    known = known_mistakes(scene, name, step).get(tuple(values))
-    return known or PLAIN_WORDS[WRONG]
-
-
-@lru_cache(maxsize=2_000)
-def known_mistakes(scene: Scene, name: str, step: int) -> dict[tuple[str, ...], str]:
-    """Words by the values that a mutated key has; without those that change nothing."""
-    asked = question(scene, name, step)
-    found: dict[tuple[str, ...], str] = {}
-    for n, (words, key) in enumerate(mutations(scene.model, asked.key)):
-        if n >= MOST:
-            break
-        found.setdefault(asked.values(key), words)
-    found.pop(asked.values(asked.key), None)
-    return found
 
 
 def _dangerous(text: str) -> str | None:

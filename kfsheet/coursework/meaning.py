@@ -14,7 +14,8 @@ from typing import NamedTuple
 from sympy import Basic, Integer, S
 
 from kfsheet.coursework.places import Places, find_sheet
-from kfsheet.coursework.submission import Book, Formula
+from kfsheet.coursework.submission import Book
+from kfsheet.coursework.worksheet import Formula
 from kfsheet.errors import FormulaError
 from kfsheet.excel.formula import (
     Tree,

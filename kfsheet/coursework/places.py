@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from kfsheet.coursework.submission import Book, Content
+from kfsheet.coursework.submission import Book
+from kfsheet.coursework.worksheet import Content
 from kfsheet.errors import FormulaError
 from kfsheet.excel.layout import Address
 from kfsheet.excel.references import Cell, read_reference

@@ -9,8 +9,9 @@ from html import escape
 from io import StringIO
 from pathlib import Path
 
+from kfsheet.coursework.diagnosis import RIGHT
 from kfsheet.coursework.grading import STATUSES, Handed, Result
-from kfsheet.coursework.judge import RIGHT, Mark
+from kfsheet.coursework.judge import Mark
 from kfsheet.coursework.marking import colour_of
 from kfsheet.coursework.roster import harmless
 from kfsheet.exercise import Exercise
