@@ -14,6 +14,7 @@ _HOMES = {
     "kfsheet.algebra": "analysis correlated_covariance diagonal_analysis discrete_noise "
     "gain_limits sequential_gain transition_matrix transition_matrix_laplace",
     "kfsheet.charts": "Chart Series",
+    "kfsheet.ensemble": "Draws NEES Study",
     "kfsheet.errors": "DataError EngineError KfsheetError ModelError PrintError WorkbookError",
     "kfsheet.evaluation": "evaluate warm_up",
     "kfsheet.excel.check": "check_workbook",
@@ -27,7 +28,6 @@ _HOMES = {
     "kfsheet.fitting": "least_squares newton_step normal_equations",
     "kfsheet.kalman": "Intermediate Observation State StateSpace add_filter",
     "kfsheet.latex": "latex_code",
-    "kfsheet.members": "Draws NEES Study",
     "kfsheet.plots": "draw",
     "kfsheet.pythoncode": "python_code",
     "kfsheet.recurrence": "Recurrence",

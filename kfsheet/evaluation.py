@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from kfsheet.members import NEES, Draws, Study
+    from kfsheet.ensemble import NEES, Draws, Study
     from kfsheet.recurrence import Recurrence
 
 WORTH_LOADING, WORTH_COMPILING = 500_000, 3_000_000  # cells computed by Python before
@@ -62,7 +62,7 @@ def evaluate(
         they do not need, and ``scalars`` holds the derived ones only.
         With ``members``, those of which statistics are wanted; none by default.
     members : int, optional
-        How many runs; the result is then a :class:`~kfsheet.members.Study`.
+        How many runs; the result is then a :class:`~kfsheet.ensemble.Study`.
     scalars, quantiles, nees, executor
         With ``members``; see :func:`kfsheet.members.study`.
     **parameters : float

@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kfsheet.errors import DataError, ModelError
+from kfsheet.ensemble import NEES, Draws, Study
+from kfsheet.errors import DataError
 from kfsheet.evaluation import (
     can_compile,
     check_data_name,
@@ -28,104 +29,13 @@ from kfsheet.evaluation import (
 )
 from kfsheet.kernel import Kernel, compiled_function, kernel_of
 from kfsheet.source import python_source
+from kfsheet.streaming import Sums, statistics
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from kfsheet.recurrence import Recurrence
 
 NUMBERS = 2**17  # of a group: as many as fit into the cache of a core
 FEWEST, MOST = 16, 2048  # members of a group
-STATISTICS = ("mean", "rms", "std", "count")
-
-
-@dataclass(frozen=True)
-class Draws:
-    """Standard-normal draws for data columns, other ones for every member.
-
-    Member k draws from ``numpy.random.RandomState((seed, k))``, column after column; so a member
-    has the same draws however many there are, and whoever computes it.
-
-    Parameters
-    ----------
-    columns : sequence of str
-        The data columns.
-    seed : int
-        From 0 to 2**32 - 1.
-    """
-
-    columns: tuple[str, ...]
-    seed: int = 0
-
-    def __init__(self, *columns: str, seed: int = 0) -> None:
-        if not columns or not all(isinstance(name, str) for name in columns):
-            raise DataError("Draws needs the names of data columns: Draws('n_theta', seed=1)")
-        if not isinstance(seed, int) or not 0 <= seed < 2**32:
-            raise DataError(f"seed is {seed!r}; it must be a whole number from 0 to 2**32 - 1")
-        object.__setattr__(self, "columns", columns)
-        object.__setattr__(self, "seed", seed)
-
-    def of(self, member: int, rows: int) -> np.ndarray:
-        """The draws of a member, one row a column: shape (columns, rows)."""
-        state = np.random.RandomState((self.seed, member))
-        return state.standard_normal((len(self.columns), rows))
-
-
-@dataclass(frozen=True)
-class NEES:
-    """Normalised estimation error squared, e' P^-1 e, from the columns of a filter.
-
-    Parameters
-    ----------
-    states : sequence of str
-        Names of the state: ``("x", "vx")``.
-    errors : str
-        Pattern of the columns of the errors: ``"e_{}_a"``.
-    covariance : str
-        Pattern of the columns of the covariance, upper triangle: ``"P_{}{}_a"``. An entry that
-        has no column is 0.
-    """
-
-    states: tuple[str, ...]
-    errors: str = "e_{}_a"
-    covariance: str = "P_{}{}_a"
-
-    def error_columns(self) -> list[str]:
-        """Names of the columns of the errors."""
-        return [self.errors.format(state) for state in self.states]
-
-    def covariance_columns(self, model: Recurrence) -> dict[tuple[int, int], str]:
-        """Names of the columns of the covariance that the model has, by place."""
-        known = {c.name for c in model.all_columns()}
-        names = {
-            (i, j): self.covariance.format(a, b)
-            for i, a in enumerate(self.states)
-            for j, b in enumerate(self.states)
-            if i <= j
-        }
-        if missing := [n for (i, j), n in names.items() if i == j and n not in known]:
-            raise ModelError(f"NEES needs the column {missing[0]}, which {model.name} lacks")
-        return {place: name for place, name in names.items() if name in known}
-
-
-@dataclass
-class Study:
-    """What many runs say: statistics over the members.
-
-    Attributes
-    ----------
-    members : int
-        How many runs.
-    rows : dict of str to DataFrame
-        For each column asked for, and each NEES, the statistics of every step over the members:
-        ``mean``, ``rms``, ``std`` (n - 1) and ``count``, members without a value left out.
-    scalars : DataFrame
-        For each scalar of the model ``mean``, ``rms``, ``std``, ``count`` and the quantiles asked.
-    """
-
-    members: int
-    rows: dict[str, pd.DataFrame]
-    scalars: pd.DataFrame
 
 
 @dataclass(frozen=True)
@@ -148,43 +58,6 @@ class _Task:
     def compiled(self) -> bool:
         """Whether the kernel is compiled; else its Python source is there."""
         return not self.python
-
-
-@dataclass
-class _Sums:
-    """Counts, means and squared deviations from them over members; and the members' scalars.
-
-    Deviations, not squares: of a distance of kilometres that varies by millimetres, the squares
-    would keep no figure of the variance.
-    """
-
-    count: np.ndarray
-    mean: np.ndarray
-    squares: np.ndarray
-    scalars: np.ndarray
-
-    @classmethod
-    def of(cls, values: np.ndarray, scalars: np.ndarray) -> _Sums:
-        """Sums over the first axis, values that are missing left out."""
-        missing = np.isnan(values)
-        if not missing.any():
-            mean = values.mean(axis=0)
-            count = np.full(mean.shape, len(values))
-            return cls(count, mean, ((values - mean) ** 2).sum(axis=0), scalars)
-        count = len(values) - missing.sum(axis=0)
-        mean = np.where(missing, 0.0, values).sum(axis=0) / np.maximum(count, 1)
-        far = np.where(missing, 0.0, values - mean)
-        return cls(count, mean, (far**2).sum(axis=0), scalars)
-
-    def add(self, other: _Sums) -> None:
-        """Add another group's (Chan, Golub and LeVeque, 1979)."""
-        count = self.count + other.count
-        share = other.count / np.maximum(count, 1)
-        far = other.mean - self.mean
-        self.squares = self.squares + other.squares + far**2 * self.count * share
-        self.mean = self.mean + far * share
-        self.count = count
-        self.scalars = np.concatenate([self.scalars, other.scalars])
 
 
 def study(
@@ -329,7 +202,7 @@ def _member_parameters(model: Recurrence, given: Mapping[str, Any], members: int
 # -- computing -----------------------------------------------------------------------------
 
 
-def _computed(task: _Task, members: int, executor: Executor | None) -> _Sums:
+def _computed(task: _Task, members: int, executor: Executor | None) -> Sums:
     if executor is not None:
         return _gathered(task, members, executor)
     workers = os.cpu_count() or 1
@@ -342,11 +215,11 @@ def _computed(task: _Task, members: int, executor: Executor | None) -> _Sums:
         pool.shutdown(cancel_futures=True)
 
 
-def _gathered(task: _Task, members: int, executor: Executor) -> _Sums:
+def _gathered(task: _Task, members: int, executor: Executor) -> Sums:
     """Sums of all groups, in order, with few of them under way at a time."""
     waiting = iter(_groups(task, members))
     running = [executor.submit(_run_group, t) for t in islice(waiting, 4 * (os.cpu_count() or 1))]
-    sums: _Sums | None = None
+    sums: Sums | None = None
     bar = _bar(members)
     try:
         while running:
@@ -389,7 +262,7 @@ def _groups(task: _Task, members: int) -> Iterator[_Task]:
         )
 
 
-def _run_group(task: _Task) -> _Sums:
+def _run_group(task: _Task) -> Sums:
     """Run one group and keep what is asked for; this is what an executor executes."""
     number = task.last - task.first
     data = dict(task.data)
@@ -406,7 +279,7 @@ def _run_group(task: _Task) -> _Sums:
         raise DataError(f"{task.name}, member {member}: a value grows beyond all bounds")
     nees = [_nees(out[:, list(e)], out, at) for e, at in task.nees]
     values = np.concatenate([out[:, list(task.statistics)], *(n[:, None] for n in nees)], axis=1)
-    return _Sums.of(values, results)
+    return Sums.of(values, results)
 
 
 def _run_compiled(
@@ -486,27 +359,20 @@ def _study(
     members: int,
     names: list[str],
     scalars: tuple[str, ...],
-    sums: _Sums,
+    sums: Sums,
     quantiles: Sequence[float],
 ) -> Study:
     import pandas as pd
 
     rows = {
         name: pd.DataFrame(
-            _statistics(sums.count[k], sums.mean[k], sums.squares[k]),
+            statistics(sums.count[k], sums.mean[k], sums.squares[k]),
             index=pd.RangeIndex(model.rows, name=model.step),
         )
         for k, name in enumerate(names)
     }
-    whole = _Sums.of(sums.scalars, sums.scalars)
-    table = pd.DataFrame(_statistics(whole.count, whole.mean, whole.squares), index=scalars)
+    whole = Sums.of(sums.scalars, sums.scalars)
+    table = pd.DataFrame(statistics(whole.count, whole.mean, whole.squares), index=scalars)
     for q in quantiles:
         table[f"{q:.4g} quantile"] = np.nanquantile(sums.scalars, q, axis=0)
     return Study(members, rows, table)
-
-
-def _statistics(count: np.ndarray, mean: np.ndarray, squares: np.ndarray) -> dict[str, np.ndarray]:
-    with np.errstate(invalid="ignore", divide="ignore"):
-        mean = np.where(count > 0, mean, np.nan)
-        found = (mean, np.sqrt(mean**2 + squares / count), np.sqrt(squares / (count - 1)), count)
-        return dict(zip(STATISTICS, found, strict=True))

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 from sympy import Abs, Expr, IndexedBase, Piecewise, diag, sign, sqrt
 
 from kfsheet.algebra import analysis
-from kfsheet.charts import Chart, Series
 from kfsheet.errors import DataError
-from kfsheet.exercise import Exercise, Question
+from kfsheet.exercise import Exercise
+from kfsheet.exercises._football_sheets import ABOUT, CHARTS, QUESTIONS, SECTIONS
 from kfsheet.expressions import RMS, Last, Mean, Missing, Std, t, when_observed
 from kfsheet.recurrence import Recurrence
 from kfsheet.tables import Table, read_table
@@ -281,105 +281,6 @@ def _flight(p: Mapping[str, float], parts: int = 100) -> tuple[list[float], list
     return [p[0] for p in path], [p[1] for p in path]
 
 
-ABOUT = (
-    "A football is kicked from 23.4 m towards the goal line at x = 0 and photographed ten times a "
-    "second. Each photo gives two pixels, with an error of 3 pixels; a simple model of the flight "
-    "gives a forecast, with an error of 0.1 m. The filter weighs one against the other.",
-    "Try this: on the sheet Parameters, change r_i and r_j from 9 to 900 (a camera with an error "
-    "of 30 pixels instead of 3). The gains K_x and K_z fall, and the analysis leans on the model. "
-    "Then look at the innovations on the sheet Charts: they should scatter about zero, within two "
-    "standard deviations. As printed in the source, the model does not pass that test; with h = 0 "
-    "and p = 2 it does.",
-    "Then delete a photo (a green cell on the sheet Reanalysis): the analysis of that row is the "
-    "forecast. The photos are simulated with quadratic drag in fine steps, so the filter's model "
-    "is not the truth.",
-)
-SECTIONS = {
-    "Reanalysis": "photos, forecast, innovation, analysis: one row per photo",
-    "Free run": "the same model without the photos",
-    "Errors": "truth, the camera alone, and what each estimate is wrong by",
-    "Pixel frame": "everything as the camera sees it, and the 2 sigma bands of the innovations",
-    "Goal line": "when and how high the ball will cross x = 0, forecast anew from every photo",
-}
-CHARTS = (
-    Chart(
-        "The kick, in metres",
-        "x: distance to the goal line (m)",
-        "z: height (m)",
-        (
-            Series("x_true", "z_true", "truth", "truth"),
-            Series("x_free", "z_free", "free run", "free"),
-            Series("x_cam", "z_cam", "camera", "observation"),
-            Series("x_f", "z_f", "forecast", "forecast"),
-            Series("x_a", "z_a", "analysis", "analysis"),
-        ),
-        note="The ball flies from right to left. The free run is the model without photos.",
-    ),
-    Chart(
-        "The kick, as the camera sees it",
-        "i: to the right (px)",
-        "j: down (px)",
-        (
-            Series("i_true", "j_true", "truth", "truth"),
-            Series("i", "j", "camera", "observation"),
-            Series("i_f", "j_f", "forecast", "forecast"),
-            Series("i_a", "j_a", "analysis", "analysis"),
-        ),
-        note="The origin of the pixels is the top left corner.",
-        origin_top_left=True,
-    ),
-    Chart(
-        "Innovations in i",
-        "time (s)",
-        "d_i: observation - forecast (px)",
-        (
-            Series("time", "d_i", "innovation d_i", "first"),
-            Series("time", "d_i_low", "", "band"),
-            Series("time", "d_i_high", "2 sigma band", "band"),
-        ),
-        note="A sound filter's innovations scatter about zero, 19 of 20 inside the band.",
-    ),
-    Chart(
-        "Innovations in j",
-        "time (s)",
-        "d_j: observation - forecast (px)",
-        (
-            Series("time", "d_j", "innovation d_j", "second"),
-            Series("time", "d_j_low", "", "second band"),
-            Series("time", "d_j_high", "2 sigma band", "second band"),
-        ),
-        note="The same for the vertical pixel, which counts downwards.",
-    ),
-    Chart(
-        "Errors of x",
-        "time (s)",
-        "estimate - truth (m)",
-        (
-            Series("time", "e_x_cam", "camera alone", "observation"),
-            Series("time", "e_x_a", "analysis", "analysis"),
-        ),
-        note="As printed (h = 0.5, p = 1), the analysis of x is worse than the camera alone.",
-    ),
-    Chart(
-        "Height at the goal line, forecast from each photo",
-        "time of the photo (s)",
-        "z_goal (m)",
-        (Series("time", "z_goal", "z_goal", "analysis"),),
-        note="The forecast settles as the ball comes closer.",
-    ),
-)
-QUESTIONS = (
-    Question("K_x", 2, "Simplify B H' (R + H B H')^-1 for diagonal B and R."),
-    Question("K_z", 2, "The linear part of j = j_0 - a z has a sign."),
-    Question("u", 2, "Mean velocity of the step, from the two analyses before it."),
-    Question("w", 2, "As u, with gravity."),
-    Question("x_f", 2, "One step of the model from the analysis before."),
-    Question("z_f", 2, "As x_f, with gravity."),
-    Question("d_i", 1, "Observation minus what the camera would see of the forecast."),
-    Question("d_j", 1, "The whole of H, also its constant part."),
-    Question("x_a", 2, "Forecast plus gain times innovation."),
-    Question("z_a", 2, "As x_a; mind the sign of K_z."),
-)
 exercise = Exercise(
     model=football,
     about=ABOUT,

@@ -1,0 +1,54 @@
+"""Statistics over many members, of groups that come one after the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+STATISTICS = ("mean", "rms", "std", "count")
+
+
+@dataclass
+class Sums:
+    """Counts, means and squared deviations from them over members; and the members' scalars.
+
+    Deviations, not squares: of a distance of kilometres that varies by millimetres, the squares
+    would keep no figure of the variance.
+    """
+
+    count: np.ndarray
+    mean: np.ndarray
+    squares: np.ndarray
+    scalars: np.ndarray
+
+    @classmethod
+    def of(cls, values: np.ndarray, scalars: np.ndarray) -> Sums:
+        """Sums over the first axis, values that are missing left out."""
+        missing = np.isnan(values)
+        if not missing.any():
+            mean = values.mean(axis=0)
+            count = np.full(mean.shape, len(values))
+            return cls(count, mean, ((values - mean) ** 2).sum(axis=0), scalars)
+        count = len(values) - missing.sum(axis=0)
+        mean = np.where(missing, 0.0, values).sum(axis=0) / np.maximum(count, 1)
+        far = np.where(missing, 0.0, values - mean)
+        return cls(count, mean, (far**2).sum(axis=0), scalars)
+
+    def add(self, other: Sums) -> None:
+        """Add another group's (Chan, Golub and LeVeque, 1979)."""
+        count = self.count + other.count
+        share = other.count / np.maximum(count, 1)
+        far = other.mean - self.mean
+        self.squares = self.squares + other.squares + far**2 * self.count * share
+        self.mean = self.mean + far * share
+        self.count = count
+        self.scalars = np.concatenate([self.scalars, other.scalars])
+
+
+def statistics(count: np.ndarray, mean: np.ndarray, squares: np.ndarray) -> dict[str, np.ndarray]:
+    """Mean, root mean square, deviation (n - 1) and count; NaN where nothing is left."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = np.where(count > 0, mean, np.nan)
+        found = (mean, np.sqrt(mean**2 + squares / count), np.sqrt(squares / (count - 1)), count)
+        return dict(zip(STATISTICS, found, strict=True))
