@@ -72,7 +72,7 @@ def _column_probes(layout: Layout, column: Column, now: Run, built: Run) -> Iter
     name, cells = column.name, layout.range(column.name)
     sheet, _ = layout.home(name)
     what = "data" if column.is_data else "result"
-    scale = _scale(rms(built.columns[name]))
+    scale = _scale(built.figure(rms, name))
     steps = layout.range("t", sheet)
     bottom = f"{cells.split(':')[0].rsplit('$', 1)[0]}${layout.last_row}"
     mean_row = f"SUMPRODUCT({steps},{cells})/SUM({steps})"
@@ -84,7 +84,7 @@ def _column_probes(layout: Layout, column: Column, now: Run, built: Run) -> Iter
     ):
         if quantity == "mean, weighted by step" and layout.model.rows == 1:
             continue
-        now_value, built_value = function(now.columns[name]), function(built.columns[name])
+        now_value, built_value = now.figure(function, name), built.figure(function, name)
         yield Probe(name, what, quantity, formula, now_value, built_value, scale)
 
 

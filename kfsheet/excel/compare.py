@@ -32,13 +32,11 @@ from kfsheet.excel.compose import (
     section_page,
 )
 from kfsheet.excel.layout import FIRST_ROW, Address, Layout
-from kfsheet.excel.page import Page, Piece, is_formula
+from kfsheet.excel.page import Filled, Page, Piece, is_formula
 from kfsheet.excel.reading import Opened
 from kfsheet.excel.recalculate import Values
 from kfsheet.exercise import Exercise
-from kfsheet.expressions import Missing, lag, t
-from kfsheet.numerics import rms
-from kfsheet.parts import Column
+from kfsheet.expressions import lag, t
 from kfsheet.pythoncode import python_code
 
 
@@ -54,8 +52,12 @@ class Comparison:
     def run(self, exercise: Exercise, now: Run, built: Run) -> None:
         """Compare every formula cell, then look for the culprits among those that differ."""
         for page in self._pages(exercise, now, built):
-            for (row, column), piece in page.cells():
+            for (row, column), piece in page.pieces.items():
                 self._compare((page.title, row, column), piece)
+            for column, filled in page.columns.items():
+                if not self._whole(page.title, column, filled):
+                    for row in filled.rows:
+                        self._compare((page.title, row, column), filled.piece(row))
         homes = self._homes() if self.differing else {}
         blind = []
         for address, piece in self.differing.items():
@@ -70,51 +72,37 @@ class Comparison:
                 self.problems[address] = self._words(piece.stored, address)
 
     def _pages(self, exercise: Exercise, now: Run, built: Run) -> Iterator[Page]:
-        """The worksheets on which cells have to be looked at one by one."""
+        """The worksheets that hold formulas."""
         yield parameters_page(self.layout, now)
         for section in self.layout.model.sections:
-            if not self._whole(section, now):
-                yield section_page(self.layout, section, now)
+            yield section_page(self.layout, section, now)
         yield charts_page(exercise, self.layout, now)
         yield check_page(self.layout, now, built)
 
-    def _whole(self, section: str, now: Run) -> bool:
-        """Whether a long worksheet agrees as a whole, so that none of its cells needs words."""
-        model, places = self.layout.model, self.layout.columns[section]
-        rows = range(FIRST_ROW, FIRST_ROW + model.rows)
-        steps = [self.book.value((section, row, places["t"])) for row in rows]
-        columns = [(c, places[c.name]) for c in model.sections[section] if not c.is_data]
-        columns += [(c, places["time"]) for c in model.clock_of(section)]
-        found = [self._column_agrees((section, at), c, now.columns[c.name]) for c, at in columns]
-        if steps != list(range(model.rows)) or None in found:
-            return False
-        self.cells += sum(cells for cells, _ in found)
-        self.largest = max([self.largest, *(far for _, far in found)])
-        return True
-
-    def _column_agrees(
-        self, place: tuple[str, int], column: Column, wanted: list[float]
-    ) -> tuple[int, float] | None:
-        """Formulas and largest difference of a column in which every cell agrees."""
-        (sheet, at), rules = place, column.rules
-        rows = range(FIRST_ROW, FIRST_ROW + len(wanted))
-        hollow = {FIRST_ROW + n for n, rule in enumerate(rules) if rule is Missing}
-        formulas = {row for row in self.book.formula_rows(sheet, at) if row in rows}
-        cells = self.values.get(sheet, {})
+    def _whole(self, sheet: str, at: int, filled: Filled) -> bool:
+        """Whether a column agrees as a whole, so that none of its cells needs words."""
+        rows, cells = filled.rows, self.values.get(sheet, {})
         found = [cells.get((row, at)) for row in rows]
+        if not filled.rules:
+            return filled.kind != "index" or found == list(filled.values)
+        hollow = {filled.first + n for n, rule in enumerate(filled.rules) if rule is None}
+        formulas = {row for row in self.book.formula_rows(sheet, at) if row in rows}
         if formulas != set(rows) - hollow or bool in set(map(type, found)):
-            return None
+            return False
+        missing = (None, "", filled.missing)
         try:
-            numbers = np.array([math.nan if v in (None, "") else v for v in found], dtype=float)
+            numbers = np.array([math.nan if v in missing else v for v in found], dtype=float)
         except ValueError:
-            return None
-        expected = np.array(wanted, dtype=float)
-        size = np.fmax(np.abs(expected), rms(wanted))
+            return False
+        expected = np.array(filled.values, dtype=float)
+        size = np.fmax(np.abs(expected), filled.scale)
         far = np.abs(numbers - expected) / np.where(size > 0, size, 1.0)
         none = np.isnan(numbers)
         if (none != np.isnan(expected)).any() or (far[~none] > self.tolerance).any():
-            return None
-        return len(formulas), float(far[~none].max(initial=0.0))
+            return False
+        self.cells += len(formulas)
+        self.largest = max(self.largest, float(far[~none].max(initial=0.0)))
+        return True
 
     def _compare(self, address: Address, piece: Piece) -> None:
         formula, value = self.book.is_formula(address), self.book.value(address)

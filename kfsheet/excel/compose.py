@@ -6,8 +6,8 @@ The same composition is what :mod:`kfsheet.excel.workbook` writes and what
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from openpyxl.utils import get_column_letter
@@ -33,6 +33,14 @@ class Run:
 
     columns: dict[str, list[float]]
     scalars: dict[str, float]
+    _figures: dict[tuple[Callable, str], float] = field(default_factory=dict, repr=False)
+
+    def figure(self, function: Callable[[list[float]], float], name: str) -> float:
+        """A figure of a column, such as its root mean square, computed once."""
+        key = (function, name)
+        if key not in self._figures:
+            self._figures[key] = function(self.columns[name])
+        return self._figures[key]
 
     @classmethod
     def of(
@@ -80,7 +88,7 @@ def _data_column(page: Page, column: Column, at: int, now: Run) -> None:
 def _formula_column(page: Page, layout: Layout, column: Column, at: int, now: Run) -> None:
     _head(page, at, column.name, column.unit, column.description)
     values = now.columns[column.name]
-    shape, size = number_format(values), rms(values)
+    shape, size = number_format(values), now.figure(rms, column.name)
     kind = "formula"
     if column is layout.model.clock:
         kind, shape = "index", "0.0##"
@@ -108,7 +116,7 @@ def parameters_page(layout: Layout, now: Run) -> Page:
         sheet, row, column = layout.scalars[name]
         value = now.scalars[name]
         text = layout.formula(scalar.expression, sheet)(row)
-        sizes = [rms(now.columns[c]) for c in columns_read(scalar.expression)]
+        sizes = [now.figure(rms, c) for c in columns_read(scalar.expression)]
         piece = Piece(
             text, "formula", stored(value), number_format([value]), "", max(sizes, default=0)
         )
@@ -159,18 +167,19 @@ def charts_page(exercise: Exercise, layout: Layout, now: Run) -> Page:
     for at, name in enumerate(names, PLOTTED_COLUMN):
         column = exercise.model.column(name)
         _head(page, at, name, column.unit, "plotted")
-        page.columns[at] = _plotted(layout, name, now.columns[name])
+        page.columns[at] = _plotted(layout, name, now)
     return page
 
 
-def _plotted(layout: Layout, name: str, values: list[float]) -> Filled:
+def _plotted(layout: Layout, name: str, now: Run) -> Filled:
     sheet, number = layout.home(name)
     cells = f"{quote(sheet)}!{get_column_letter(number)}"
 
     def rule(row: int) -> str:
         return f"=IF(ISNUMBER({cells}{row}),{cells}{row},NA())"
 
-    shape, size = number_format(values), rms(values)
+    values = now.columns[name]
+    shape, size = number_format(values), now.figure(rms, name)
     return Filled(FIRST_ROW, values, "formula", shape, size, (rule,), NOT_AVAILABLE)
 
 

@@ -24,8 +24,11 @@ Changes = dict[str, dict[tuple[int, int], float | None]]
 """Numbers to put into cells before calculating, by sheet and (row, column); None empties one."""
 
 PREFIX = re.compile(rb"<(\w+:)?worksheet\b")
-STORED = rb"(?:(?<=</%(p)bf>)|(?<=/>))\s*<%(p)bv\b[^>]*>[^<]*</%(p)bv>"
-TYPED = re.compile(rb'(<(?:\w+:)?c\b[^>]*?)\s+t="[^"]*"([^>]*>\s*<(?:\w+:)?f\b)')
+# A value after a formula, or after the empty element of one that is shared. Both patterns begin
+# with letters that are searched for quickly.
+STORED = tuple(end + rb"\s*<%(p)bv\b[^>]*>[^<]*</%(p)bv>" for end in (b"</%(p)bf>", b"/>"))
+EMPTIED = (b"</%(p)bf><%(p)bv></%(p)bv>", b"/><%(p)bv></%(p)bv>")
+TYPED = re.compile(rb'\st="[A-Za-z]+"(?=[^<>]*>\s*<(?:\w+:)?f\b)')
 FORMULA_CELL = re.compile(rb'<(?:\w+:)?c\b[^>]*?\br="([A-Z]+)([1-9][0-9]*)"[^>]*>\s*<(?:\w+:)?f\b')
 CELL = re.compile(rb"<((?:\w+:)?c)((?:\s[^>]*)?)(?:/>|(?<!/)>.*?</\1>)", re.DOTALL)
 TYPE = re.compile(rb'\s+t="[^"]*"')
@@ -140,8 +143,9 @@ def _stripped(xml: bytes) -> bytes:
     found = PREFIX.search(xml)
     prefix = {b"p": (found and found[1]) or b""}
     # An empty value, not none at all: IronCalc reports a formula that lacks the element.
-    emptied = re.sub(STORED % prefix, b"<%(p)bv></%(p)bv>" % prefix, xml)
-    xml = TYPED.sub(rb"\1\2", emptied)
+    for stored, emptied in zip(STORED, EMPTIED, strict=True):
+        xml = re.sub(stored % prefix, emptied % prefix, xml)
+    xml = TYPED.sub(b"", xml)
     return EMPTY.sub(rb"\1\2", xml) if b't="n"' in xml else xml
 
 
