@@ -29,7 +29,7 @@ from kfsheet.evaluation import (
 )
 from kfsheet.kernel import Kernel, compiled_function, kernel_of
 from kfsheet.source import python_source
-from kfsheet.streaming import Sums, statistics
+from kfsheet.streaming import Sums
 
 if TYPE_CHECKING:
     from kfsheet.recurrence import Recurrence
@@ -54,10 +54,29 @@ class _Task:
     statistics: tuple[int, ...]
     nees: tuple[tuple[tuple[int, ...], tuple[tuple[int, int, int], ...]], ...]
 
+    keep: bool = False
+    """Whether the scalars of all members are kept, for quantiles."""
+
     @property
     def compiled(self) -> bool:
         """Whether the kernel is compiled; else its Python source is there."""
         return not self.python
+
+
+@dataclass
+class _Found:
+    """What groups of members say: sums of rows and of scalars, and the scalars that are kept."""
+
+    members: int
+    rows: Sums
+    scalars: Sums
+    kept: list[np.ndarray]
+
+    def add(self, other: _Found) -> None:
+        self.members += other.members
+        self.rows.add(other.rows)
+        self.scalars.add(other.scalars)
+        self.kept += other.kept
 
 
 def study(
@@ -86,7 +105,8 @@ def study(
     scalars : sequence of str, optional
         Scalars of which statistics over the members are wanted; all by default.
     quantiles : sequence of float
-        Quantiles of the scalars over the members, from 0 to 1.
+        Quantiles of the scalars over the members, from 0 to 1. They need the scalars of all
+        members at once, 8 bytes each; nothing else grows with the number of members.
     nees : mapping of str to NEES
         Further quantities, by a name of their own.
     executor : Executor, optional
@@ -110,8 +130,9 @@ def study(
             raise DataError(f"{model.name} has no scalar {name}")
     kept = None if scalars is None else tuple(scalars)
     task = _first_task(model, members, data, names, kept, nees, parameters)
-    sums = _computed(task, members, executor)
-    return _study(model, members, [*names, *nees], task.kernel.scalars, sums, quantiles)
+    task = replace(task, keep=bool(quantiles))
+    found = _computed(task, members, executor)
+    return _study(model, members, [*names, *nees], task.kernel.scalars, found, quantiles)
 
 
 def _first_task(
@@ -202,7 +223,7 @@ def _member_parameters(model: Recurrence, given: Mapping[str, Any], members: int
 # -- computing -----------------------------------------------------------------------------
 
 
-def _computed(task: _Task, members: int, executor: Executor | None) -> Sums:
+def _computed(task: _Task, members: int, executor: Executor | None) -> _Found:
     if executor is not None:
         return _gathered(task, members, executor)
     workers = os.cpu_count() or 1
@@ -215,27 +236,27 @@ def _computed(task: _Task, members: int, executor: Executor | None) -> Sums:
         pool.shutdown(cancel_futures=True)
 
 
-def _gathered(task: _Task, members: int, executor: Executor) -> Sums:
-    """Sums of all groups, in order, with few of them under way at a time."""
+def _gathered(task: _Task, members: int, executor: Executor) -> _Found:
+    """What all groups say, in order, with few of them under way at a time."""
     waiting = iter(_groups(task, members))
     running = [executor.submit(_run_group, t) for t in islice(waiting, 4 * (os.cpu_count() or 1))]
-    sums: Sums | None = None
+    whole: _Found | None = None
     bar = _bar(members)
     try:
         while running:
             found = running.pop(0).result()
             running += [executor.submit(_run_group, t) for t in islice(waiting, 1)]
-            bar.update(len(found.scalars))
-            if sums is None:
-                sums = found
+            bar.update(found.members)
+            if whole is None:
+                whole = found
             else:
-                sums.add(found)
+                whole.add(found)
     finally:
         bar.close()
         for future in running:
             future.cancel()
-    assert sums is not None  # there is at least one member
-    return sums
+    assert whole is not None  # there is at least one member
+    return whole
 
 
 def _bar(members: int) -> Any:
@@ -262,7 +283,7 @@ def _groups(task: _Task, members: int) -> Iterator[_Task]:
         )
 
 
-def _run_group(task: _Task) -> Sums:
+def _run_group(task: _Task) -> _Found:
     """Run one group and keep what is asked for; this is what an executor executes."""
     number = task.last - task.first
     data = dict(task.data)
@@ -279,7 +300,7 @@ def _run_group(task: _Task) -> Sums:
         raise DataError(f"{task.name}, member {member}: a value grows beyond all bounds")
     nees = [_nees(out[:, list(e)], out, at) for e, at in task.nees]
     values = np.concatenate([out[:, list(task.statistics)], *(n[:, None] for n in nees)], axis=1)
-    return Sums.of(values, results)
+    return _Found(number, Sums.of(values), Sums.of(results), [results] if task.keep else [])
 
 
 def _run_compiled(
@@ -359,20 +380,19 @@ def _study(
     members: int,
     names: list[str],
     scalars: tuple[str, ...],
-    sums: Sums,
+    found: _Found,
     quantiles: Sequence[float],
 ) -> Study:
     import pandas as pd
 
     rows = {
         name: pd.DataFrame(
-            statistics(sums.count[k], sums.mean[k], sums.squares[k]),
+            found.rows.statistics(k),
             index=pd.RangeIndex(model.rows, name=model.step),
         )
         for k, name in enumerate(names)
     }
-    whole = Sums.of(sums.scalars, sums.scalars)
-    table = pd.DataFrame(statistics(whole.count, whole.mean, whole.squares), index=scalars)
+    table = pd.DataFrame(found.scalars.statistics(), index=scalars)
     for q in quantiles:
-        table[f"{q:.4g} quantile"] = np.nanquantile(sums.scalars, q, axis=0)
+        table[f"{q:.4g} quantile"] = np.nanquantile(np.concatenate(found.kept), q, axis=0)
     return Study(members, rows, table)

@@ -11,7 +11,7 @@ STATISTICS = ("mean", "rms", "std", "count")
 
 @dataclass
 class Sums:
-    """Counts, means and squared deviations from them over members; and the members' scalars.
+    """Counts, means and squared deviations from them over members.
 
     Deviations, not squares: of a distance of kilometres that varies by millimetres, the squares
     would keep no figure of the variance.
@@ -20,20 +20,19 @@ class Sums:
     count: np.ndarray
     mean: np.ndarray
     squares: np.ndarray
-    scalars: np.ndarray
 
     @classmethod
-    def of(cls, values: np.ndarray, scalars: np.ndarray) -> Sums:
+    def of(cls, values: np.ndarray) -> Sums:
         """Sums over the first axis, values that are missing left out."""
         missing = np.isnan(values)
         if not missing.any():
             mean = values.mean(axis=0)
             count = np.full(mean.shape, len(values))
-            return cls(count, mean, ((values - mean) ** 2).sum(axis=0), scalars)
+            return cls(count, mean, ((values - mean) ** 2).sum(axis=0))
         count = len(values) - missing.sum(axis=0)
         mean = np.where(missing, 0.0, values).sum(axis=0) / np.maximum(count, 1)
         far = np.where(missing, 0.0, values - mean)
-        return cls(count, mean, (far**2).sum(axis=0), scalars)
+        return cls(count, mean, (far**2).sum(axis=0))
 
     def add(self, other: Sums) -> None:
         """Add another group's (Chan, Golub and LeVeque, 1979)."""
@@ -43,12 +42,11 @@ class Sums:
         self.squares = self.squares + other.squares + far**2 * self.count * share
         self.mean = self.mean + far * share
         self.count = count
-        self.scalars = np.concatenate([self.scalars, other.scalars])
 
-
-def statistics(count: np.ndarray, mean: np.ndarray, squares: np.ndarray) -> dict[str, np.ndarray]:
-    """Mean, root mean square, deviation (n - 1) and count; NaN where nothing is left."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        mean = np.where(count > 0, mean, np.nan)
-        found = (mean, np.sqrt(mean**2 + squares / count), np.sqrt(squares / (count - 1)), count)
-        return dict(zip(STATISTICS, found, strict=True))
+    def statistics(self, at: int | slice = slice(None)) -> dict[str, np.ndarray]:
+        """Mean, root mean square, deviation (n - 1) and count; NaN where nothing is left."""
+        count, mean, squares = self.count[at], self.mean[at], self.squares[at]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            mean = np.where(count > 0, mean, np.nan)
+            spread, size = np.sqrt(squares / (count - 1)), np.sqrt(mean**2 + squares / count)
+        return dict(zip(STATISTICS, (mean, size, spread, count), strict=True))
