@@ -12,7 +12,7 @@ import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
@@ -27,56 +27,15 @@ from kfsheet.evaluation import (
     checked_parameters,
     facts_of,
 )
-from kfsheet.kernel import Kernel, compiled_function, kernel_of
+from kfsheet.group import Found, Task, run_group
+from kfsheet.kernel import compiled_function, kernel_of
 from kfsheet.source import python_source
-from kfsheet.streaming import Sums
 
 if TYPE_CHECKING:
     from kfsheet.recurrence import Recurrence
 
 NUMBERS = 2**17  # of a group: as many as fit into the cache of a core
 FEWEST, MOST = 16, 2048  # members of a group
-
-
-@dataclass(frozen=True)
-class _Task:
-    """What one group needs, free of the model so that it can travel."""
-
-    kernel: Kernel
-    python: str
-    name: str
-    rows: int
-    first: int
-    last: int
-    parameters: np.ndarray
-    data: dict[str, np.ndarray]
-    draws: Draws | None
-    statistics: tuple[int, ...]
-    nees: tuple[tuple[tuple[int, ...], tuple[tuple[int, int, int], ...]], ...]
-
-    keep: bool = False
-    """Whether the scalars of all members are kept, for quantiles."""
-
-    @property
-    def compiled(self) -> bool:
-        """Whether the kernel is compiled; else its Python source is there."""
-        return not self.python
-
-
-@dataclass
-class _Found:
-    """What groups of members say: sums of rows and of scalars, and the scalars that are kept."""
-
-    members: int
-    rows: Sums
-    scalars: Sums
-    kept: list[np.ndarray]
-
-    def add(self, other: _Found) -> None:
-        self.members += other.members
-        self.rows.add(other.rows)
-        self.scalars.add(other.scalars)
-        self.kept += other.kept
 
 
 def study(
@@ -143,7 +102,7 @@ def _first_task(
     scalars: tuple[str, ...] | None,
     nees: Mapping[str, NEES],
     parameters: Mapping[str, Any],
-) -> _Task:
+) -> Task:
     """The task of all members, to be cut into groups."""
     facts = facts_of(model)
     facts.wanted(model, names)
@@ -161,7 +120,7 @@ def _first_task(
     for name, values in ({} if draws else data or {}).items():
         check_data_name(name, series, model)
         series[name] = _member_data(model, name, values, members)
-    return _Task(
+    return Task(
         kernel,
         "" if can_compile() else python_source(model),
         model.name,
@@ -223,7 +182,7 @@ def _member_parameters(model: Recurrence, given: Mapping[str, Any], members: int
 # -- computing -----------------------------------------------------------------------------
 
 
-def _computed(task: _Task, members: int, executor: Executor | None) -> _Found:
+def _computed(task: Task, members: int, executor: Executor | None) -> Found:
     if executor is not None:
         return _gathered(task, members, executor)
     workers = os.cpu_count() or 1
@@ -236,16 +195,16 @@ def _computed(task: _Task, members: int, executor: Executor | None) -> _Found:
         pool.shutdown(cancel_futures=True)
 
 
-def _gathered(task: _Task, members: int, executor: Executor) -> _Found:
+def _gathered(task: Task, members: int, executor: Executor) -> Found:
     """What all groups say, in order, with few of them under way at a time."""
     waiting = iter(_groups(task, members))
-    running = [executor.submit(_run_group, t) for t in islice(waiting, 4 * (os.cpu_count() or 1))]
-    whole: _Found | None = None
+    running = [executor.submit(run_group, t) for t in islice(waiting, 4 * (os.cpu_count() or 1))]
+    whole: Found | None = None
     bar = _bar(members)
     try:
         while running:
             found = running.pop(0).result()
-            running += [executor.submit(_run_group, t) for t in islice(waiting, 1)]
+            running += [executor.submit(run_group, t) for t in islice(waiting, 1)]
             bar.update(found.members)
             if whole is None:
                 whole = found
@@ -265,7 +224,7 @@ def _bar(members: int) -> Any:
     return tqdm(total=members, unit=" runs", leave=False, disable=not sys.stderr.isatty())
 
 
-def _groups(task: _Task, members: int) -> Iterator[_Task]:
+def _groups(task: Task, members: int) -> Iterator[Task]:
     size = NUMBERS // (task.rows * max(1, len(task.kernel.columns)))
     size = min(max(size, FEWEST), MOST)
     for first in range(0, members, size):
@@ -283,95 +242,6 @@ def _groups(task: _Task, members: int) -> Iterator[_Task]:
         )
 
 
-def _run_group(task: _Task) -> _Found:
-    """Run one group and keep what is asked for; this is what an executor executes."""
-    number = task.last - task.first
-    data = dict(task.data)
-    if task.draws:
-        drawn = [task.draws.of(member, task.rows) for member in range(task.first, task.last)]
-        for k, name in enumerate(task.draws.columns):
-            data[name] = np.ascontiguousarray([member[k] for member in drawn])
-    out = np.empty((number, len(task.kernel.columns), task.rows))
-    results = np.empty((number, len(task.kernel.scalars)))
-    run = _run_compiled if task.compiled else _run_python
-    run(task, data, out, results)
-    if np.isinf(out).any():
-        member = task.first + int(np.nonzero(np.isinf(out))[0][0])
-        raise DataError(f"{task.name}, member {member}: a value grows beyond all bounds")
-    nees = [_nees(out[:, list(e)], out, at) for e, at in task.nees]
-    values = np.concatenate([out[:, list(task.statistics)], *(n[:, None] for n in nees)], axis=1)
-    return _Found(number, Sums.of(values), Sums.of(results), [results] if task.keep else [])
-
-
-def _run_compiled(
-    task: _Task, data: dict[str, np.ndarray], out: np.ndarray, results: np.ndarray
-) -> None:
-    function = compiled_function(task.kernel.source)
-    series = [data[name] for name in task.kernel.data]
-    try:
-        function(0, len(out), task.parameters, *series, out, results)
-    except (ArithmeticError, ValueError) as error:
-        raise DataError(_which(task, data, out, results, error)) from None
-
-
-def _which(
-    task: _Task,
-    data: dict[str, np.ndarray],
-    out: np.ndarray,
-    results: np.ndarray,
-    error: Exception,
-) -> str:
-    """Which member it was: run one at a time."""
-    function = compiled_function(task.kernel.source)
-    series = [data[name] for name in task.kernel.data]
-    for k in range(len(out)):
-        try:
-            function(k, k + 1, task.parameters, *series, out[k : k + 1], results[k : k + 1])
-        except (ArithmeticError, ValueError):
-            return (
-                f"{task.name}, member {task.first + k} has no value: {error}; "
-                "run it alone to see where"
-            )
-    return f"{task.name}: {error}"
-
-
-def _run_python(
-    task: _Task, data: dict[str, np.ndarray], out: np.ndarray, results: np.ndarray
-) -> None:
-    """The same without a compiler."""
-    namespace: dict[str, Any] = {}
-    exec(compile(task.python, f"<kfsheet {task.name}>", "exec"), namespace)  # printed by us
-    for k in range(len(out)):
-        values = task.parameters[min(k, len(task.parameters) - 1)].tolist()
-        series = {name: rows[min(k, len(rows) - 1)].tolist() for name, rows in data.items()}
-        try:
-            columns, scalars = namespace[task.name](
-                **series, **dict(zip(task.kernel.parameters, values, strict=True))
-            )
-        except (ArithmeticError, ValueError, TypeError) as error:
-            raise DataError(
-                f"{task.name}, member {task.first + k} has no value: {error}; "
-                "run it alone to see where"
-            ) from None
-        out[k] = [columns[name] for name in task.kernel.columns]
-        results[k] = [scalars[name] for name in task.kernel.scalars]
-
-
-def _nees(
-    errors: np.ndarray, out: np.ndarray, entries: tuple[tuple[int, int, int], ...]
-) -> np.ndarray:
-    """E' P^-1 e of every member and row, NaN where an error is missing."""
-    number, n, rows = errors.shape
-    P = np.zeros((number, rows, n, n))
-    for i, j, place in entries:
-        P[:, :, i, j] = P[:, :, j, i] = out[:, place]
-    e = errors.transpose(0, 2, 1)
-    there = ~np.isnan(e).any(axis=-1)
-    P[~there] = np.eye(n)
-    solved = np.linalg.solve(P, np.where(there[..., None], e, 0.0)[..., None])[..., 0]
-    return np.where(there, (e * solved).sum(axis=-1), np.nan)
-
-
 # -- the result ----------------------------------------------------------------------------
 
 
@@ -380,7 +250,7 @@ def _study(
     members: int,
     names: list[str],
     scalars: tuple[str, ...],
-    found: _Found,
+    found: Found,
     quantiles: Sequence[float],
 ) -> Study:
     import pandas as pd
