@@ -19,7 +19,16 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import students as do
 
 CLASS = 300
-MISTAKES = (do.helper_columns, do.values_pasted, do.hard_coded, do.absolute_slip)
+
+
+def sign_error(paper: do.Paper, name: str) -> None:
+    """Minus the answer."""
+    paper.answer(name, do.negated)
+
+
+MISTAKES = (
+    do.helper_columns, do.values_pasted, do.absolute_slip, do.broken_fill_down, sign_error,
+)  # fmt: skip
 
 
 def lines() -> Iterator[Line]:
@@ -40,6 +49,8 @@ def graded(folder: Path) -> Line:
         for question in exercise.questions[n % 3 :: 3]:
             if question.name in exercise.model.table:
                 next(kinds)(paper, question.name)
+        if n % 7 == 0:
+            do.hard_coded(paper, "x_f")
         paper.save()
     out = iter(range(CLASS))
 
