@@ -25,6 +25,10 @@ class EngineError(KfsheetError):
     """A spreadsheet engine is missing, crashed or ran out of time."""
 
 
+class ForbiddenError(KfsheetError):
+    """A formula uses what no answer may use."""
+
+
 class FormulaError(KfsheetError):
     """A formula cannot be read as mathematics: arrays, look-ups, text, or no formula at all."""
 

@@ -233,6 +233,25 @@ def test_the_owner_of_a_path_is_found_as_platforms_write_it(tmp_path, path, expe
     assert (found and found.id) == expected
 
 
+@pytest.mark.parametrize(
+    ("path", "holder", "expected"),
+    [
+        ("football (1).xlsx", "2", None),
+        ("Bob Ray_3_assignsubmission_file_/football.xlsx", "2", "2"),
+        ("raybob_3_1_football.xlsx", "2", "2"),
+        ("3/football.xlsx", "3", "3"),
+        ("3/football.xlsx", "2", "3"),
+        ("Cy Dee_2_assignsubmission_file_/football.xlsx", "2", "3"),
+    ],
+)
+def test_the_numbers_of_a_platform_are_nobodys_id(tmp_path, path, holder, expected):
+    """The token says whose the file is; a path contradicts it by a name or a folder only."""
+    people = [Student("1", "Al Bo"), Student("2", "Bob Ray"), Student("3", "Cy Dee")]
+    token_of = next(s for s in people if s.id == holder)
+    found = owner(tmp_path / path, tmp_path, people, token_of)
+    assert (found and found.id) == expected
+
+
 # -- a course ------------------------------------------------------------------------------------
 
 

@@ -228,7 +228,7 @@ def test_a_formula_split_over_several_helper_columns_and_names_is_right(football
         ("x_f", "=K{p}+E{r}*dt", "wrong", "term is missing"),
         ("x_f", "=K{p}+E{r}*dt-h*f*SIGN(E{r})*E{r}^2*dt", "hard-coded", " p "),
         ("x_f", "=G{r}", "wrong", "own cell"),
-        ("x_f", "=K{r}-IF(ISNUMBER(I{r}),K_x*I{r},0)", "wrong", "value than"),
+        ("x_f", "=K{r}-IF(ISNUMBER(I{r}),K_x*I{r},0)", "wrong", "circle"),
         ("d_i", "=C{r}-a*G{r}", "gaps forgotten", "missing"),
         ("x_f", "=K{p}+1.001*E{r}*dt-h*f*SIGN(E{r})*E{r}^2*dt^p", "rounded", "rounded"),
         ("x_a", "=G{r}+K_x*I{r}", "gaps forgotten", "missing"),
@@ -345,3 +345,97 @@ def test_another_students_numbers_typed_in_are_not_taken_for_hard_coded(handouts
     paper.answer("K_x", lambda *_: f"={value}*b_x/(r_i+{value}^2*b_x)")
     mark = one(paper, "K_x")
     assert (mark.status, mark.score) == ("wrong", 0)
+
+
+# -- found by readers who tried to fool it --------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "condition", ["$A{r}=7", "$B{r}>1.25", "ROUND(10*$B{r},0)=7", "$A{r}>12", "MOD($A{r},5)=3"]
+)
+def test_a_formula_that_is_wrong_in_some_rows_is_not_right(football, condition):
+    """The row's own number decides, so that every row is another function."""
+    football.answer_all()
+    for cell, text in football.cells("u"):
+        cell.value = f"=IF({condition.format(r=cell.row)},0,{text[1:]})"
+    mark = one(football, "u")
+    assert mark.score < mark.points
+
+
+def test_another_number_in_every_row_is_worth_nothing(football):
+    """Values in disguise: the first row alone looks like a parameter's value."""
+    football.answer_all()
+    for n, (cell, value) in enumerate(
+        zip((c for c, _ in football.cells("u")), football.values("u"), strict=True)
+    ):
+        cell.value = f"={value - 0.25 * n!r}+{n}*dt+0*K{max(cell.row - 1, 4)}"
+    for (cell, _), value in zip(football.cells("x_f"), football.values("x_f"), strict=True):
+        cell.value = f"={value!r}+0*E{cell.row}"
+    _, marks = judged(football)
+    assert (marks["u"].score, marks["x_f"].score) == (0, 0)
+    assert {marks["u"].status, marks["x_f"].status} <= {"typed", "wrong"}
+
+
+def test_a_lost_sign_is_not_called_a_number(football):
+    football.answer_all()
+    football.answer("w", lambda text, _: re.sub(r"SIGN\(F\d+\)\*", "", text))
+    mark = one(football, "w")
+    assert (mark.status, mark.score) == ("wrong", 0)
+    assert "sign of a velocity" in mark.remark
+
+
+def test_a_column_that_repeats_the_answer_is_no_answer(football):
+    football.answer_all()
+    for cell, _ in football.cells("u")[1:]:
+        cell.value = f"='Goal line'!C{cell.row - 1}"
+    mark = one(football, "u")
+    assert mark.score < mark.points
+    assert "repeats the answer" in mark.remark
+
+
+def test_a_wrong_sign_filled_down_from_the_first_row_is_named(football):
+    """The first row has a start rule of its own; the kind of mistake is that of all the others."""
+    football.answer_all()
+    for cell, _ in football.cells("x_a"):
+        cell.value = f"=IF(ISNUMBER(I{cell.row}),G{cell.row}-K_x*I{cell.row},G{cell.row})"
+    mark = one(football, "x_a")
+    assert "a sign is wrong" in mark.remark
+
+
+@pytest.mark.parametrize(
+    "formula", ['=INDIRECT("G6")', '=WEBSERVICE("http://localhost")', "=[1]S!A1"]
+)
+def test_what_is_not_allowed_is_not_allowed_in_a_helper_cell(football, formula):
+    football.answer_all()
+    football.book["Reanalysis"]["Z6"] = formula
+    football.book["Reanalysis"]["G6"] = "=Z6"
+    mark = one(football, "x_f")
+    assert mark.score < mark.points
+    assert "not allowed" in mark.remark
+
+
+def test_circular_answers_are_told(football):
+    football.answer_all()
+    for cell, _ in football.cells("x_f")[1:]:
+        cell.value = f"=K{cell.row}-IF(ISNUMBER(I{cell.row}),K_x*I{cell.row},0)"
+    mark = one(football, "x_f")
+    assert "goes in a circle" in mark.remark
+
+
+def test_rows_that_are_right_are_named_beside_empty_ones(football):
+    football.answer_all()
+    for cell, _ in football.cells("d_i")[5:]:
+        cell.value = None
+    mark = one(football, "d_i")
+    assert mark.remark.startswith("right in rows ")
+    assert mark.remark.endswith("empty")
+
+
+def test_a_formula_that_takes_for_ever_costs_its_own_answer_only(football, monkeypatch):
+    """Whole columns inside SUMPRODUCT: a million rows in every cell."""
+    monkeypatch.setattr("kfsheet.coursework.recalculating.SECONDS", 6)
+    football.answer_all()
+    for cell, _ in football.cells("u")[1:]:
+        cell.value = f"=SUMPRODUCT((A:A=A{cell.row}-1)*(K:K))+IFERROR(0,1)"
+    mark = one(football, "u")
+    assert mark.score == 0

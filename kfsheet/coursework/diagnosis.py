@@ -6,12 +6,13 @@ import hashlib
 from collections.abc import Sequence
 from functools import lru_cache
 
-from sympy import Basic
+from sympy import Basic, Dummy, Indexed, Number
 
 from kfsheet.coursework.comparing import Question, question
 from kfsheet.coursework.mutations import MOST, mutations
 from kfsheet.coursework.worlds import Own, Scene
 from kfsheet.expressions import t
+from kfsheet.recurrence import Recurrence
 
 RIGHT, EMPTY, TYPED, WRONG = "right", "empty", "typed", "wrong"
 HARD_CODED, PARTLY, GAPS, ROUNDED = "hard-coded", "partly right", "gaps forgotten", "rounded"
@@ -30,27 +31,63 @@ def is_right(scene: Scene, name: str, step: int, expression: Basic) -> bool:
     return question(scene, name, step).same(expression)
 
 
+def judged_in(model: Recurrence, name: str, step: int, expression: Basic) -> list[int]:
+    """Steps in which a formula is judged for all rows that hold it."""
+    if name in model.derived_scalars:
+        return [0]
+    starts = len(model.column(name).start)
+    if step < starts or asks_for_its_row(model, expression):
+        return [step]
+    return sorted({starts, (starts + model.rows - 1) // 2, model.rows - 1})
+
+
+@lru_cache(maxsize=20_000)
+def asks_for_its_row(model: Recurrence, expression: Basic) -> bool:
+    """Whether an expression reads the number or the time of its row, not cells beside it only."""
+    clock = model.clock and model.clock.base
+    cells = expression.atoms(Indexed)
+    if any(cell.base == clock for cell in cells):
+        return True
+    return expression.xreplace({cell: Dummy() for cell in cells}).has(t)
+
+
+def digest_of(name: str, values: Sequence[str]) -> str:
+    """A fingerprint: the same for the same values of the same answer."""
+    return hashlib.sha256("/".join((name, *values)).encode()).hexdigest()[:12]
+
+
 @lru_cache(maxsize=20_000)
 def diagnose(
-    scene: Scene, name: str, step: int, expression: Basic, own: Own
+    scene: Scene, name: str, steps: tuple[int, ...], expression: Basic, own: Own
 ) -> tuple[str, str, str]:
-    """Status, words and fingerprint of a wrong formula."""
+    """Status, words and fingerprint of a formula that is wrong in one of the steps."""
+    step = next((k for k in steps if not is_right(scene, name, k, expression)), steps[0])
     asked = question(scene, name, step)
     values = asked.values(expression)
-    fingerprint = hashlib.sha256("/".join((name, *values)).encode()).hexdigest()[:12]
+    fingerprint = digest_of(name, values)
+    everywhere = [question(scene, name, k) for k in steps]
     parameters = Own(own.parameters)
-    if asked.same(expression, parameters):
-        names = ", ".join(_still(asked, expression, own)) or "a parameter"
-        words = f"right only as long as {names} keeps its value: a number stands in its place"
-        return HARD_CODED, words, fingerprint
-    if asked.same(expression, gaps=False):
+    if _has_a_number(asked, expression) and all(q.same(expression, parameters) for q in everywhere):
+        names = _still(asked, expression, own) or ["a parameter"]
+        many = len(names) > 1
+        keep, place = ("keep their values", "their") if many else ("keeps its value", "its")
+        words = f"right only as long as {', '.join(names)} {keep}"
+        return HARD_CODED, f"{words}: a number stands in {place} place", fingerprint
+    if all(q.same(expression, gaps=False) for q in everywhere):
         words = "right where there is an observation, wrong where one is missing"
         return GAPS, words, fingerprint
-    if asked.same(expression, own):
+    if _has_a_number(asked, expression) and all(q.same(expression, own) for q in everywhere):
         return HARD_CODED, "a number from the data stands where its cell belongs", fingerprint
-    if asked.nearly(expression):
+    if all(q.nearly(expression) for q in everywhere):
         return ROUNDED, "nearly right: a constant in it is rounded", fingerprint
     return WRONG, _words_of(scene, name, step, expression, values), fingerprint
+
+
+def _has_a_number(asked: Question, expression: Basic) -> bool:
+    """Whether something that the key reads is missing, so that a number may stand for it."""
+    return bool(expression.atoms(Number) - asked.key.atoms(Number)) or bool(
+        asked.key.free_symbols - expression.free_symbols
+    )
 
 
 def _still(asked: Question, expression: Basic, own: Own) -> list[str]:
@@ -65,6 +102,8 @@ def _still(asked: Question, expression: Basic, own: Own) -> list[str]:
 
 def _words_of(scene: Scene, name: str, step: int, expression: Basic, values: Sequence[str]) -> str:
     if name in scene.model.table and expression.has(scene.model[name][t]):
+        return "the formula refers to its own cell"
+    if name in scene.model.derived_scalars and expression.has(scene.model[name]):
         return "the formula refers to its own cell"
     known = known_mistakes(scene, name, step).get(tuple(values))
     return known or PLAIN_WORDS[WRONG]

@@ -12,8 +12,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from openpyxl.utils import get_column_letter
-from sympy import Basic, Indexed
+from sympy import Basic, Indexed, Number, Symbol
 
+from kfsheet.checks import columns_read
+from kfsheet.coursework.circles import find_circle
+from kfsheet.coursework.comparing import question
 from kfsheet.coursework.diagnosis import (
     EMPTY,
     GAPS,
@@ -27,15 +30,18 @@ from kfsheet.coursework.diagnosis import (
     TYPED,
     UNREADABLE,
     WRONG,
+    asks_for_its_row,
     diagnose,
+    digest_of,
     is_right,
+    judged_in,
 )
 from kfsheet.coursework.meaning import Interpreter, parsed
 from kfsheet.coursework.places import Places
 from kfsheet.coursework.submission import Book
 from kfsheet.coursework.worksheet import Formula
 from kfsheet.coursework.worlds import Own, Scene
-from kfsheet.errors import FormulaError
+from kfsheet.errors import ForbiddenError, FormulaError
 from kfsheet.excel.layout import Address
 from kfsheet.excel.references import Reference
 from kfsheet.exercise import Exercise
@@ -45,10 +51,7 @@ from kfsheet.recurrence import Recurrence
 
 CREDIT = {RIGHT: 1.0, HARD_CODED: 0.5, PARTLY: 0.5, GAPS: 0.5, ROUNDED: 0.5}
 """Share of the points by status; what is not listed gets none."""
-DANGEROUS = frozenset(
-    "WEBSERVICE HYPERLINK INDIRECT DDE RTD CALL REGISTER.ID FILTERXML IMAGE IMPORTXML IMPORTDATA "
-    "IMPORTHTML IMPORTRANGE IMPORTFEED CUBEVALUE EXEC SQL.REQUEST".split()
-)
+NUMBER = Symbol("a number")
 FARTHEST = 8  # rows back; a key looks one or two rows back
 
 
@@ -129,14 +132,16 @@ class Judge:
             return Cell(step, address, EMPTY)
         if not isinstance(content, Formula):
             return Cell(step, address, TYPED)
-        if called := _dangerous(content.text):
-            return Cell(step, address, REFUSED, words=f"{called} is not allowed")
         try:
             meaning = self._interpreter.meaning(address, step)
+        except ForbiddenError as error:
+            return Cell(step, address, REFUSED, words=str(error))
         except FormulaError as error:
             return Cell(step, address, UNREADABLE, words=str(error))
         lagged = as_lags(meaning.expression, step) if meaning.fixed_rows else meaning.expression
-        key = (name, lagged, self._rule(name, step))
+        # A formula that asks for its own row is another function in every row.
+        own_row = asks_for_its_row(self._model, lagged)
+        key = (name, lagged, step if own_row else self._rule(name, step), own_row)
         if key not in self._verdicts:
             self._verdicts[key] = self._judged(name, Cell(step, address, WRONG, lagged))
         status, words = self._verdicts[key]
@@ -157,9 +162,20 @@ class Judge:
             return TYPED, ""
         if farthest(cell.expression) > FARTHEST:
             return WRONG, ""
-        steps = _judged_in(self._model, name, cell.step)
+        if repeated := self._repeats(name, cell):
+            return WRONG, f"{repeated} repeats the answer; derive it"
+        steps = judged_in(self._model, name, cell.step, cell.expression)
         right = all(is_right(self._scene, name, step, cell.expression) for step in steps)
+        if right and asks_for_its_row(self._model, cell.expression):
+            own = Own(self._own.parameters)  # a time is met exactly only with the own parameters
+            right = question(self._scene, name, cell.step).same(cell.expression, own)
         return RIGHT if right else WRONG, ""
+
+    def _repeats(self, name: str, cell: Cell) -> str:
+        """A column that hides the answer's own formula, if this one reads it unlike the key."""
+        key = question(self._scene, name, cell.step).key
+        given = columns_read(cell.expression) - columns_read(key)
+        return next((column for column in self._exercise.veiled if column in given), "")
 
     def _reads_nothing(self, cell: Cell) -> bool:
         content = self.book.sheets[cell.address[0]][cell.address[1:]]
@@ -172,31 +188,43 @@ class Judge:
         rest = [c for c in cells if c.status != RIGHT]
         if not rest:
             return Mark(asked.name, asked.points, float(asked.points), RIGHT, "")
-        culprit, words, fingerprint = self._diagnosis(asked.name, rest)
-        status = culprit.status
-        if right and len(right) >= len(rest):
-            status = PARTLY
+        group = _largest_group(rest, lambda cell: self._rule(asked.name, cell.step))
+        status, words, fingerprint = self._diagnosis(asked.name, group, rest)
+        if CREDIT.get(status) and 2 * (len(group) + len(right)) <= len(cells):
+            status, words = WRONG, PLAIN_WORDS[WRONG]  # a few rows do not stand for all
+        if right:
             words = f"right in {_rows(right)}; {self._where(rest, right)}: {words}"
+            status = PARTLY if len(right) >= len(rest) else status
         score = asked.points * CREDIT.get(status, 0.0)
         return Mark(asked.name, asked.points, score, status, words, fingerprint)
 
-    def _diagnosis(self, name: str, rest: list[Cell]) -> tuple[Cell, str, str]:
-        """The most frequent kind of cell that is not right, in words."""
-        counts = Counter((c.status, c.expression, c.words) for c in rest)
-        (status, expression, words), _ = counts.most_common(1)[0]
-        culprit = next(
-            c for c in rest if (c.status, c.expression, c.words) == (status, expression, words)
-        )
-        if expression is None:
-            return culprit, words or PLAIN_WORDS[status], ""
+    def _diagnosis(self, name: str, group: list[Cell], rest: list[Cell]) -> tuple[str, str, str]:
+        """Status, words and fingerprint of the most frequent kind of cell that is not right."""
+        culprit = group[0]
+        if culprit.expression is None:
+            typed = culprit.status == TYPED
+            fingerprint = self._typed_fingerprint(name, group) if typed else ""
+            return culprit.status, culprit.words or PLAIN_WORDS[culprit.status], fingerprint
+        if _numbers_in_disguise(rest):
+            return TYPED, "another number stands in every row; it moves with no parameter", ""
+        expression = culprit.expression
         if culprit.fixed:
             expression = as_lags(expression, culprit.step)
-        steps = _judged_in(self._model, name, culprit.step)
-        step = next((k for k in steps if not is_right(self._scene, name, k, expression)), steps[0])
-        status, words, fingerprint = diagnose(self._scene, name, step, expression, self._own)
+        if culprit.words:
+            return WRONG, culprit.words, ""
+        steps = tuple(judged_in(self._model, name, culprit.step, expression))
+        status, words, fingerprint = diagnose(self._scene, name, steps, expression, self._own)
+        if words == PLAIN_WORDS[WRONG]:
+            circle = find_circle(self._interpreter, self.places, name, culprit.step)
+            words = f"it goes in a circle: {' -> '.join(circle)}" if circle else words
         if status == WRONG and culprit.fixed and len(rest) > 1:
             words = f"every row refers to {self._fixed_words(culprit)}; {words}"
-        return Cell(culprit.step, culprit.address, status), words, fingerprint
+        return status, words, fingerprint
+
+    def _typed_fingerprint(self, name: str, group: list[Cell]) -> str:
+        """Equal numbers in the files of two students, whose data differ, were not computed."""
+        found = [self.book.sheets[c.address[0]].get(c.address[1:]) for c in group]
+        return digest_of(name, [f"{v:.9g}" if isinstance(v, float) else str(v) for v in found])
 
     def _where(self, rest: list[Cell], right: list[Cell]) -> str:
         first = rest[0]
@@ -256,20 +284,22 @@ def farthest(expression: Basic) -> int:
     return max((abs(int(lag(c))) for c in expression.atoms(Indexed)), default=0)
 
 
-def _judged_in(model: Recurrence, name: str, step: int) -> list[int]:
-    """Steps in which a formula is judged for all rows that hold it."""
-    if name in model.derived_scalars:
-        return [0]
-    starts = len(model.column(name).start)
-    if step < starts:
-        return [step]
-    return sorted({starts, (starts + model.rows - 1) // 2, model.rows - 1})
+def _largest_group(rest: list[Cell], rule_of: Callable[[Cell], int]) -> list[Cell]:
+    """Cells with the same formula under the same rule; of equally many those of the later rule."""
+    groups: dict[tuple, list[Cell]] = {}
+    for cell in rest:
+        key = (cell.status, cell.expression, cell.words, rule_of(cell))
+        groups.setdefault(key, []).append(cell)
+    return max(groups.items(), key=lambda group: (len(group[1]), group[0][-1]))[1]
 
 
-def _dangerous(text: str) -> str | None:
-    upper = text.upper()
-    found = (name for name in DANGEROUS if f"{name}(" in upper)
-    return next(found, "DDE" if "|" in text and "!" in text else None)
+def _numbers_in_disguise(rest: list[Cell]) -> bool:
+    """Whether rows differ in nothing but their numbers: pasted values with something around."""
+    found = {c.expression for c in rest if c.expression is not None}
+    if len(found) < 4 or 2 * len(found) <= len(rest):
+        return False
+    shapes = Counter(e.xreplace(dict.fromkeys(e.atoms(Number), NUMBER)) for e in found)
+    return 2 * shapes.most_common(1)[0][1] > len(found)
 
 
 def _rows(cells: list[Cell]) -> str:

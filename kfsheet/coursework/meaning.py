@@ -7,6 +7,7 @@ that is asked for; so each formula is read once, for all rows and all students.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from functools import lru_cache
 from typing import NamedTuple
@@ -16,7 +17,7 @@ from sympy import Basic, Integer, S
 from kfsheet.coursework.places import Places, find_sheet
 from kfsheet.coursework.submission import Book
 from kfsheet.coursework.worksheet import Formula
-from kfsheet.errors import FormulaError
+from kfsheet.errors import ForbiddenError, FormulaError
 from kfsheet.excel.formula import (
     Tree,
     number,
@@ -31,6 +32,11 @@ from kfsheet.excel.references import Reference, relative_key
 from kfsheet.expressions import Missing, t
 from kfsheet.recurrence import Recurrence
 
+DANGEROUS = frozenset(
+    "WEBSERVICE HYPERLINK INDIRECT DDE RTD CALL REGISTER.ID FILTERXML IMAGE IMPORTXML IMPORTDATA "
+    "IMPORTHTML IMPORTRANGE IMPORTFEED CUBEVALUE EXEC SQL.REQUEST".split()
+)
+LINK = re.compile(r"\[\d+\]")
 DEEPEST_HELPERS = 40  # helper cell upon helper cell
 LARGEST = 3_000  # nodes of an expression, helpers written out
 WIDEST = 64  # cells of a range that is no whole column
@@ -62,6 +68,8 @@ class Interpreter:
         ------
         FormulaError
             If it cannot be read as mathematics, goes in a circle or grows beyond all limits.
+        ForbiddenError
+            If it, or a helper cell that it reads, reaches out of the workbook.
         """
         content = self._content(address)
         if not isinstance(content, Formula):
@@ -74,6 +82,8 @@ class Interpreter:
         return self._book.sheets[sheet].get(tuple(cell))
 
     def _signature(self, address: Address, formula: Formula, step: int) -> Slot:
+        if words := forbidden(formula.text):
+            raise ForbiddenError(f"{words} is not allowed")
         if formula.array:
             raise FormulaError("an array formula is not read as mathematics")
         if address in self._open:
@@ -146,6 +156,17 @@ class Interpreter:
         if content is None:
             return ("blank",)
         return ("text",) if isinstance(content, str) else ("number", float(content))
+
+
+@lru_cache(maxsize=20_000)
+def forbidden(text: str) -> str | None:
+    """What a formula uses that no answer may use, if there is such a thing."""
+    upper = text.upper()
+    if found := next((name for name in DANGEROUS if f"{name}(" in upper), None):
+        return found
+    if LINK.search(text):
+        return "a link to another file"
+    return "DDE" if "|" in text and "!" in text else None
 
 
 _trees: dict[str, tuple[Tree, tuple[Reference, ...]]] = {}
