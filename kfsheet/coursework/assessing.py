@@ -15,7 +15,7 @@ from kfsheet.coursework.judge import Judge, Mark
 from kfsheet.coursework.marking import mark_workbook
 from kfsheet.coursework.places import named_cell
 from kfsheet.coursework.questions import TOKEN_NAME
-from kfsheet.coursework.recalculating import recalculated
+from kfsheet.coursework.recalculating import Recalculation
 from kfsheet.coursework.submission import Book, read_submission
 from kfsheet.coursework.variation import own_numbers
 from kfsheet.coursework.worlds import Scene
@@ -109,8 +109,10 @@ def _assessed(
 ) -> Assessment:
     own = own_numbers(exercise, secret, student)
 
+    recalculation = Recalculation(path, scene)
+
     def asked(name: str) -> dict[int, bool]:
-        return recalculated(path, scene, judge.places, name)
+        return recalculation(judge.places, name)
 
     judge = Judge(exercise, scene, book, own, asked)
     marks = judge.marks()

@@ -11,11 +11,11 @@ from kfsheet.coursework.roster import Student
 from kfsheet.errors import DataError
 
 IGNORED = {"__MACOSX", "Thumbs.db", "desktop.ini"}
-OTHER_KINDS = {".pdf", ".docx", ".doc", ".txt", ".html", ".png", ".jpg", ".jpeg", ".py", ".ipynb"}
+NOTES = {".txt", ".html"}  # what a platform adds of its own
 
 
-def submitted_files(folder: str | Path) -> list[Path]:
-    """Every file below a folder that could be meant as a workbook, in order; no links.
+def submitted_files(folder: str | Path, without: Path | None = None) -> list[Path]:
+    """Every file below a folder that somebody handed in, in order; no links, no reports of ours.
 
     Raises
     ------
@@ -25,7 +25,8 @@ def submitted_files(folder: str | Path) -> list[Path]:
     folder = Path(folder)
     if not folder.is_dir():
         raise DataError(f"{folder} is no folder; give the folder that holds the submissions")
-    return sorted(_walk(folder))
+    ours = without and without.resolve()
+    return sorted(p for p in _walk(folder) if ours not in p.resolve().parents)
 
 
 def _walk(folder: Path) -> Iterator[Path]:
@@ -34,18 +35,28 @@ def _walk(folder: Path) -> Iterator[Path]:
             continue
         if path.is_dir():
             yield from _walk(path)
-        elif path.is_file() and path.suffix.lower() not in OTHER_KINDS:
+        elif path.is_file() and path.suffix.lower() not in NOTES:
             yield path
 
 
-def owner(path: Path, folder: Path, students: Sequence[Student]) -> Student | None:
-    """The one student whose id or name the path carries, as Moodle, Canvas or a person wrote it."""
-    words = _words("/".join(path.relative_to(folder).parts))
-    by_id = [s for s in students if _has(words, s.id)]
-    if by_id:
-        return by_id[0] if len(by_id) == 1 else None
+def owner(
+    path: Path, folder: Path, students: Sequence[Student], holder: Student | None = None
+) -> Student | None:
+    """The one student whose name or id the path carries, as Moodle, Canvas or a person wrote it.
+
+    ``holder`` is the one whose token the file carries; a path that could be that student's is.
+    Platforms write numbers of their own into names, and browsers count copies, so a plain number is
+    somebody's id only where it is a whole name of a folder or file.
+    """
+    parts = path.relative_to(folder).parts
+    words = _words("/".join(parts))
+    whole = {*parts[:-1], path.stem}
     by_name = [s for s in students if _named(words, s.name)]
-    return by_name[0] if len(by_name) == 1 else None
+    by_id = [s for s in students if (s.id in whole if s.id.isdigit() else _has(words, s.id))]
+    if holder and holder in (*by_name, *by_id):
+        return holder
+    found = by_id or by_name
+    return found[0] if len(found) == 1 else None
 
 
 def _plain(text: str) -> str:

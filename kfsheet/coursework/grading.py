@@ -116,8 +116,9 @@ def grade(
         A result for each student, in the order of the roster, and every file.
     """
     folder, out = Path(submissions), Path(out)
-    files = submitted_files(folder)
-    keys = {path: _key(path, exercise, secret) for path in files}
+    files = submitted_files(folder, out)
+    version = _fingerprint(exercise)
+    keys = {path: _key(path, version, secret) for path in files}
 
     def run(tasks: list[tuple]) -> Iterator[tuple[tuple, Any]]:
         if executor is not None:
@@ -125,15 +126,16 @@ def grade(
         return Pool(assess, jobs, seconds=seconds).run(tasks)
 
     judged = _judged(keys, spec, secret, out / "work", run, progress)
+    by_id = {student.id: student for student in students}
     handed = [
-        Handed(path, owner(path, folder, students), keys[path], judged[keys[path]])
-        for path in files
+        Handed(path, owner(path, folder, students, by_id.get(found.student)), keys[path], found)
+        for path, found in ((path, judged[keys[path]]) for path in files)
     ]
     maximum = sum(question.points for question in exercise.questions)
     return [_result(student, handed, maximum) for student in students], handed
 
 
-def _key(path: Path, exercise: Exercise, secret: bytes) -> str:
+def _key(path: Path, version: str, secret: bytes) -> str:
     """Names a result: by what the file holds, not by where it lies."""
     content = hashlib.sha256()
     try:
@@ -142,9 +144,17 @@ def _key(path: Path, exercise: Exercise, secret: bytes) -> str:
                 content.update(block)
     except OSError:
         content.update(str(path).encode())
-    questions = repr(exercise.questions)
-    parts = ("key", exercise.name, questions, kfsheet.__version__, content.hexdigest())
+    parts = ("key", version, kfsheet.__version__, content.hexdigest())
     return tokens.digest(secret, *parts).hex()[:32]
+
+
+def _fingerprint(exercise: Exercise) -> str:
+    """Changes with the exercise: a corrected key must not leave old marks standing."""
+    model = exercise.model
+    rules = [(c.name, c.unit, str(c.rules)) for c in model.all_columns()]
+    scalars = [str(s) for s in (*model.parameters.values(), *model.derived_scalars.values())]
+    asked = (exercise.questions, exercise.vary, exercise.noise, exercise.frozen, exercise.veiled)
+    return f"{exercise.name}{rules}{scalars}{asked}"
 
 
 def _judged(

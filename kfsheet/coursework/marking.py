@@ -135,7 +135,7 @@ def _with_words(xml: str, cells: dict[str, Mark], numbers: dict[str, int]) -> st
     for place, mark in cells.items():
         words = f"{mark.score:g}/{mark.points}: {mark.status}. {mark.remark}".strip()
         new = _inline(place, words, numbers[colour_of(mark)])
-        pattern = rf'<c r="{place}"(?:\s[^>]*)?(?:/>|>.*?</c>)'
+        pattern = rf'<c r="{place}"(?:\s[^>]*?)?(?:/>|>.*?</c>)'
         xml = re.sub(pattern, lambda _, new=new: new, xml, count=1, flags=re.DOTALL)
     return xml
 

@@ -7,6 +7,7 @@ answer's cells must be what the key gives there. Several times, so that no accid
 
 from __future__ import annotations
 
+import time
 from functools import lru_cache
 from pathlib import Path
 
@@ -15,42 +16,57 @@ from sympy import Basic
 
 from kfsheet.coursework.arithmetic import MISSING, Value
 from kfsheet.coursework.comparing import ERROR, difference, question, worth
+from kfsheet.coursework.engine import calculated
 from kfsheet.coursework.judge import asked_steps
 from kfsheet.coursework.places import Places
 from kfsheet.coursework.worlds import ALONE, Scene, World, cell_of
 from kfsheet.errors import KfsheetError
-from kfsheet.excel.recalculate import Changes, Values, recalculate
+from kfsheet.excel.package import Changes
+from kfsheet.excel.recalculate import CellValue
 
 RUNS = (0, 2, 4, 6, 1, 3)
 """Numbers of the worlds: four near the model's own run, two anywhere."""
 HUGE = 1e12  # where a column feeds itself with numbers from anywhere, it may grow beyond sense
 TOLERANCE = 1e-9
+SECONDS = 60.0  # of an engine's time for one workbook, all answers together
 FEWEST = 3
 """Runs in which an answer must have a number to be called right."""
 
 
-def recalculated(path: Path, scene: Scene, places: Places, name: str) -> dict[int, bool]:
-    """Whether each step of an answer has the key's value in every run; {} if no engine can tell."""
-    steps = asked_steps(scene.model, name)
-    good, counts = dict.fromkeys(steps, True), dict.fromkeys(steps, 0)
-    for number in RUNS:
-        world = _world(scene, number)
+class Recalculation:
+    """Asks an engine about one workbook, as long as its time lasts."""
+
+    def __init__(self, path: Path, scene: Scene) -> None:
+        self._path, self._scene, self._left = path, scene, SECONDS
+
+    def __call__(self, places: Places, name: str) -> dict[int, bool]:
+        """Whether each step of an answer has the key's value in every run; {} if none can tell."""
+        scene, began = self._scene, time.monotonic()
+        steps = asked_steps(scene.model, name)
+        cells = {step: places.address(name, step) for step in steps}
+        worlds = [_world(scene, number) for number in RUNS]
+        trials = [_changes(scene, places, name, world) for world in worlds]
         try:
-            values = recalculate(path, "ironcalc", _changes(scene, places, name, world))
+            found = calculated(self._path, trials, list(cells.values()), self._left)
         except KfsheetError:
             return {}
-        live = _Live(world, values, places, name)
-        for step in steps:
-            live.row = step
-            wanted = worth(question(scene, name, step).key, live)
-            found = live.found(step)
-            far = difference(found, wanted)
-            senseless = isinstance(wanted, mpmath.mpf) and abs(wanted) > HUGE
-            if far is None or (world.wild and (ERROR in (found, wanted) or senseless)):
-                continue
-            good[step] &= far <= TOLERANCE
-            counts[step] += isinstance(wanted, mpmath.mpf)
-    return {step: good[step] and counts[step] >= FEWEST for step in steps}
+        finally:
+            self._left = max(1.0, self._left - (time.monotonic() - began))
+        good, counts = dict.fromkeys(steps, True), dict.fromkeys(steps, 0)
+        for world, values in zip(worlds, found, strict=True):
+            live = _Live(world, dict(zip(steps, values, strict=True)), name)
+            for step in steps:
+                live.row = step
+                wanted = worth(question(scene, name, step).key, live)
+                far = difference(live.found(step), wanted)
+                senseless = isinstance(wanted, mpmath.mpf) and abs(wanted) > HUGE
+                if far is None or (
+                    world.wild and (ERROR in (live.found(step), wanted) or senseless)
+                ):
+                    continue
+                good[step] &= far <= TOLERANCE
+                counts[step] += isinstance(wanted, mpmath.mpf)
+        return {step: good[step] and counts[step] >= FEWEST for step in steps}
 
 
 @lru_cache(maxsize=len(RUNS))
@@ -83,8 +99,8 @@ class _Live:
 
     wild = gaps = False
 
-    def __init__(self, world: World, values: Values, places: Places, name: str) -> None:
-        self._world, self._values, self._places, self._name = world, values, places, name
+    def __init__(self, world: World, values: dict[int, CellValue], name: str) -> None:
+        self._world, self._values, self._name = world, values, name
         self.row = 0
 
     def __call__(self, node: Basic, row: int) -> Value:
@@ -96,8 +112,7 @@ class _Live:
 
     def found(self, step: int) -> Value | str:
         """What the engine found in a cell of the answer."""
-        address = self._places.address(self._name, step)
-        value = self._values.get(address[0], {}).get(address[1:]) if address else None
+        value = self._values.get(step)
         if isinstance(value, bool) or (isinstance(value, str) and value.startswith("#")):
             return ERROR
         return mpmath.mpf(value) if isinstance(value, int | float) else MISSING
