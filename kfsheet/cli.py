@@ -5,12 +5,13 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from kfsheet import __version__
-from kfsheet.errors import KfsheetError, ModelError, WorkbookError
+from kfsheet.errors import DataError, KfsheetError, ModelError, WorkbookError
 
 if TYPE_CHECKING:
     from kfsheet.excel.check import Report
@@ -223,6 +224,7 @@ def run_handout(arguments: argparse.Namespace) -> int:
 
 def run_grade(arguments: argparse.Namespace) -> int:
     """Grade a folder of submissions; a bad file is a status in the table, not an error."""
+    from kfsheet.coursework.assessing import NO_TOKEN
     from kfsheet.coursework.grading import grade, override
     from kfsheet.coursework.overrides import read_overrides, with_all_marks
     from kfsheet.coursework.reports import write_reports
@@ -246,6 +248,12 @@ def run_grade(arguments: argparse.Namespace) -> int:
     results = override([with_all_marks(r, exercise) for r in results], iter(lines))
     for path in write_reports(exercise, results, handed, out):
         print(path)
+    statuses = Counter(result.status for result in results)
+    print("; ".join(f"{status}: {count}" for status, count in statuses.most_common()))
+    found = [file.assessment for file in handed]
+    if any(a.status == NO_TOKEN for a in found) and not any(a.student for a in found):
+        complain(DataError("no file carries a token of this course; is --secret the right file?"))
+        return DOES_NOT_HOLD
     return HOLDS
 
 

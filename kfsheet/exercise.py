@@ -56,8 +56,11 @@ class Exercise:
         Data columns that hold standard-normal draws; every student gets other ones.
     frozen : tuple of str
         Worksheets whose formulas would give answers away; handouts hold their values only.
+    task : tuple of str
+        What a student must know to answer the questions, such as the model's equations in words.
     veiled : tuple of str
-        Columns that stay live in handouts, but hide their formulas: one repeats an answer's.
+        Columns and derived scalars that stay live in handouts, but hide their formulas: they repeat
+        an answer's, or a part of it.
     draw : function of (generator, parameters), optional
         Draws other data columns anew, as lists by name; None in a list is a missing value.
 
@@ -79,11 +82,17 @@ class Exercise:
     vary: dict[str, tuple[float, float]] = field(default_factory=dict)
     noise: tuple[str, ...] = ()
     frozen: tuple[str, ...] = ()
+    task: tuple[str, ...] = ()
     veiled: tuple[str, ...] = ()
     draw: Draw | None = None
 
     def __post_init__(self) -> None:
-        for name, kind in (("about", str), ("charts", Chart), ("questions", Question)):
+        for name, kind in (
+            ("about", str),
+            ("task", str),
+            ("charts", Chart),
+            ("questions", Question),
+        ):
             given = getattr(self, name)
             if not isinstance(given, tuple) or not all(isinstance(item, kind) for item in given):
                 raise ModelError(
@@ -101,7 +110,7 @@ class Exercise:
             raise ModelError(f"{self.name}: alarm names {self.alarm}, which is no summary")
         if unknown := {*self.sections, *self.frozen} - set(self.model.sections):
             raise ModelError(f"{self.name} has no section {unknown.pop()!r}")
-        for name in self.veiled:
+        for name in set(self.veiled) - set(self.model.derived_scalars):
             self.model.column(name)
         self._check_variation()
 

@@ -5,6 +5,7 @@ import os
 import shutil
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import openpyxl
 import pytest
@@ -13,8 +14,10 @@ from students import ADA, SECRET, Paper
 
 from kfsheet import DataError, ModelError, cli, load_exercise
 from kfsheet.coursework.collecting import owner
-from kfsheet.coursework.grading import grade
+from kfsheet.coursework.grading import _fingerprint, grade
 from kfsheet.coursework.handout import handout_bytes, own_run
+from kfsheet.coursework.judge import Mark
+from kfsheet.coursework.marking import _with_words
 from kfsheet.coursework.questions import FIRST, LOOKS_RIGHT, NOT_YET
 from kfsheet.coursework.roster import Student, harmless, read_roster
 from kfsheet.coursework.tokens import read_secret, read_token, token
@@ -361,7 +364,7 @@ def test_every_student_gets_the_own_workbook_with_marks_beside_the_answers(grade
 
 def test_the_class_page_shows_mistakes_copies_and_other_peoples_files(graded):
     page = (graded / "class.html").read_text()
-    assert page.count("<svg") == 2
+    assert page.count("<svg") == 3  # scores, questions, mistakes
     assert "a sign is wrong" in page
     assert "s002, s003" in page  # the same wrong u
     assert "s004" in page.partition("somebody else's token")[2]
@@ -393,6 +396,55 @@ def test_a_second_run_goes_on_and_keeps_what_a_lecturer_changed(course, graded):
     again = {p.name: p.stat().st_mtime_ns for p in (graded / "work").glob("*.json")}
     assert sum(again[name] != kept[name] for name in kept) == 1
     (graded / "overrides.csv").write_text("id,question,score,remark\n")
+
+
+def test_the_students_own_workbook_shows_what_a_lecturer_changed(course, graded):
+    home, ask, sub = course
+    (graded / "overrides.csv").write_text("id,question,score,remark\ns002,u,1.5,kind\n")
+    assert call("grade", "football", sub, *ask, "--out", graded) == 0
+    marks = openpyxl.load_workbook(graded / "feedback" / "s002.xlsx")["Marks"]
+    line = next(row for row in marks.values if row[0] == "u")
+    assert line[1:] == ("2", "1.5", "wrong", "kind")
+    assert (
+        "1.5/2" in openpyxl.load_workbook(graded / "feedback/s002.xlsx")["Reanalysis"]["E3"].value
+    )
+    (graded / "overrides.csv").write_text("id,question,score,remark\n")
+
+
+def test_a_corrected_exercise_leaves_no_old_marks(course, tmp_path):
+    """The same files and folder, another key: judged anew."""
+    _, _, sub = course
+    key = next(q for q in FOOTBALL.questions if q.name == "u")
+    fewer = replace(FOOTBALL, questions=tuple(q for q in FOOTBALL.questions if q is not key))
+    assert _fingerprint(FOOTBALL) == _fingerprint(load_exercise("football"))
+    assert len({_fingerprint(FOOTBALL), _fingerprint(fewer)}) == 2
+
+
+def test_a_secret_that_fits_no_file_is_told(course, tmp_path, capsys):
+    home, _, sub = course
+    (tmp_path / "other").write_bytes(b"another secret of 32 bytes......")
+    ask = ("--roster", home / "roster.csv", "--secret", tmp_path / "other")
+    assert call("grade", "football", sub, *ask, "--out", tmp_path / "g") == 1
+    assert "is --secret the right file?" in capsys.readouterr().err
+
+
+def test_reports_inside_the_folder_of_submissions_are_no_submissions(course, tmp_path):
+    _, ask, sub = course
+    shutil.copytree(sub, tmp_path / "in")
+    for _ in range(2):
+        assert call("grade", "football", tmp_path / "in", *ask, "--out", tmp_path / "in/out") == 0
+    assert not any(
+        "files came back" in line["remark"] and "2" not in line["remark"]
+        for line in table(tmp_path / "in/out/grades.csv")
+    )
+
+
+def test_a_mark_leaves_the_cell_beside_it():
+    xml = '<row r="3"><c r="G3" s="11"/><c r="H3" s="11"/></row>'
+    mark = Mark("x_f", 2, 2.0, "right", "")
+    found = _with_words(xml, {"G3": mark}, {"full": 7})
+    assert found.endswith('<c r="H3" s="11"/></row>')
+    assert "2/2: right" in found
 
 
 @pytest.mark.parametrize(

@@ -130,7 +130,7 @@ def _assessed(
 def _write_copy(path: Path, copy: Path, judge: Judge, result: Assessment) -> bool:
     """The student's own workbook with marks; a file too odd for that goes without."""
     try:
-        write_file(copy, mark_workbook(path, judge, result.marks))
+        write_file(copy, mark_workbook(path, judge.book, judge.places, result.marks))
     except (KfsheetError, ValueError, KeyError):
         return False
     return True

@@ -55,6 +55,8 @@ class Result:
     key: str = ""
     feedback: bool = False
     override: float | None = None
+    changed: bool = False
+    """Whether a lecturer has changed a mark."""
 
     @property
     def score(self) -> float:
@@ -231,6 +233,7 @@ def override(results: list[Result], lines: Iterator[dict[str, Any]]) -> list[Res
     for line in lines:
         result = by_id[line["id"]]
         remark = line.get("remark") or "changed by the lecturer"
+        result.changed = True
         if not line["question"]:
             result.override, result.remark = line["score"], remark
             continue

@@ -34,6 +34,7 @@ from kfsheet.excel.compose import Run
 from kfsheet.excel.layout import FIRST_ROW, Layout
 from kfsheet.excel.page import Page, Piece, is_formula
 from kfsheet.excel.recalculate import Values, recalculate
+from kfsheet.excel.styles import LEGEND
 from kfsheet.excel.workbook import Shell, assemble, built_bytes, compose
 from kfsheet.exercise import Exercise
 from kfsheet.exercises import load_exercise
@@ -41,6 +42,14 @@ from kfsheet.files import write_file
 from kfsheet.names import LAST_COLUMN
 
 TOKEN_PROPERTY = "kfsheet token"
+YOURS = (
+    "This is your own workbook: its parameters and data are drawn for you alone, so they differ "
+    "from the numbers in the words below. What to do stands on the sheet Questions."
+)
+LOCKED = {
+    LEGEND["parameter"]: "a parameter: your own number, locked; the feedback holds for it only",
+    LEGEND["data"]: "a measurement or another given number, locked; an empty one was not made",
+}
 
 
 def write_handouts(
@@ -130,7 +139,8 @@ def handout_bytes(exercise: Exercise, student: Student, secret: bytes) -> bytes:
 
 def handout_pages(exercise: Exercise, layout: Layout, now: Run) -> list[Page]:
     """The exercise's worksheets with empty answers, without "Check", which knows the answers."""
-    pages = [p for p in compose(exercise, layout, now, now) if p.title != "Check"]
+    words = replace(exercise, about=(YOURS, exercise.about[0]))
+    pages = [p for p in compose(words, layout, now, now) if p.title != "Check"]
     by_title = {page.title: page for page in pages}
     for question in exercise.questions:
         words = f"{question.points} point{'s' * (question.points > 1)}: {question.hint}"
@@ -140,13 +150,19 @@ def handout_pages(exercise: Exercise, layout: Layout, now: Run) -> list[Page]:
             by_title[sheet].put(row, column + 2, words, "words", align="wrap")
             continue
         sheet, column = layout.home(question.name)
-        by_title[sheet].put(3, column, words, "words", align="wrap")
-        by_title[sheet].heights[3] = 90
+        meant = exercise.model.column(question.name).description
+        by_title[sheet].put(3, column, f"{meant}. {words}", "words", align="wrap")
+        by_title[sheet].heights[3] = 110
         for step in asked_steps(exercise.model, question.name):
             _empty(by_title[sheet], (FIRST_ROW + step, column))
     for section in exercise.frozen:
         _freeze(by_title[section])
     for name in exercise.veiled:
+        if name in layout.scalars:
+            sheet, *place = layout.scalars[name]
+            piece = by_title[sheet].at(*place)
+            by_title[sheet].pieces[tuple(place)] = piece._replace(kind="veiled")
+            continue
         sheet, column = layout.home(name)
         _veil(by_title[sheet], column)
     _mend_read_me(by_title["Read me"])
@@ -177,6 +193,8 @@ def _mend_parameters(page: Page) -> None:
 def _mend_read_me(page: Page) -> None:
     """The words about the sheet "Check", which handouts lack, become words about the questions."""
     for (row, column), piece in list(page.pieces.items()):
+        if piece.content in LOCKED:
+            page.put(row, column, LOCKED[piece.content], align="wrap")
         if piece.content == "Check" and piece.kind == "index":
             page.put(row, column, SHEET, "index")
             page.put(row, column + 1, "what to fill in, and whether it looks right", align="wrap")

@@ -16,7 +16,9 @@ from xml.sax.saxutils import escape
 
 from openpyxl.utils import get_column_letter
 
-from kfsheet.coursework.judge import Judge, Mark
+from kfsheet.coursework.judge import Mark
+from kfsheet.coursework.places import Places
+from kfsheet.coursework.submission import Book
 from kfsheet.errors import WorkbookError
 from kfsheet.excel.layout import Address
 
@@ -33,15 +35,19 @@ def colour_of(mark: Mark) -> str:
     return "full" if mark.score == mark.points else "part" if mark.score else "none"
 
 
-def mark_workbook(path: Path, judge: Judge, marks: Sequence[Mark]) -> bytes:
+def mark_workbook(
+    path: Path, book: Book, places: Places, marks: Sequence[Mark], total: float | None = None
+) -> bytes:
     """The workbook at ``path`` with marks beside the answers and on a sheet of their own.
+
+    ``total`` takes the place of the sum of the marks, where a lecturer has given one.
 
     Raises
     ------
     WorkbookError
         If a part of the workbook is not where it should be.
     """
-    result, book = BytesIO(), judge.book
+    result = BytesIO()
     with zipfile.ZipFile(path) as old, zipfile.ZipFile(result, "w", zipfile.ZIP_DEFLATED) as new:
         styles, numbers = _styles(old.read("xl/styles.xml").decode())
         changed = {
@@ -58,13 +64,13 @@ def mark_workbook(path: Path, judge: Judge, marks: Sequence[Mark]) -> bytes:
                 f'<Override PartName="/{PART}" ContentType="{CONTENT}"/>',
             ),
         }
-        for sheet, cells in _headings(judge, marks).items():
+        for sheet, cells in _headings(places, marks).items():
             part = book.parts[sheet]
             changed[part] = _with_words(old.read(part).decode(), cells, numbers)
         for item in old.infolist():
             content = changed.get(item.filename)
             new.writestr(item.filename, old.read(item) if content is None else content.encode())
-        new.writestr(PART, _sheet(marks, numbers))
+        new.writestr(PART, _sheet(marks, numbers, total))
     return result.getvalue()
 
 
@@ -112,22 +118,22 @@ def _with_sheet(xml: str, sheets: object) -> str:
     return _before(xml, "</sheets>", new)
 
 
-def _headings(judge: Judge, marks: Sequence[Mark]) -> dict[str, dict[str, Mark]]:
+def _headings(places: Places, marks: Sequence[Mark]) -> dict[str, dict[str, Mark]]:
     """The cell above each column of answers, or to the right of a scalar, by sheet."""
     found: dict[str, dict[str, Mark]] = {}
     for mark in marks:
-        address = _heading(judge, mark.name)
+        address = _heading(places, mark.name)
         if address:
             sheet, row, column = address
             found.setdefault(sheet, {})[f"{get_column_letter(column)}{row}"] = mark
     return found
 
 
-def _heading(judge: Judge, name: str) -> Address | None:
-    if name in judge.places.columns:
-        table, column = judge.places.columns[name]
+def _heading(places: Places, name: str) -> Address | None:
+    if name in places.columns:
+        table, column = places.columns[name]
         return table.sheet, table.header + 2, column
-    address = judge.places.address(name)
+    address = places.address(name)
     return address and (address[0], address[1], address[2] + 2)
 
 
@@ -146,14 +152,15 @@ def _inline(place: str, words: str, style: int | None = None) -> str:
     return f'<c r="{place}"{look} t="inlineStr"><is><t xml:space="preserve">{text}</t></is></c>'
 
 
-def _sheet(marks: Sequence[Mark], numbers: dict[str, int]) -> str:
+def _sheet(marks: Sequence[Mark], numbers: dict[str, int], total: float | None) -> str:
     """The worksheet "Marks"."""
     lines = [(HEADS, None)]
     for m in marks:
         cells = (m.name, str(m.points), f"{m.score:g}", m.status, m.remark)
         lines.append((cells, numbers[colour_of(m)]))
-    total = (sum(m.points for m in marks), sum(m.score for m in marks))
-    lines.append((("total", str(total[0]), f"{total[1]:g}", "", ""), None))
+    points, score = sum(m.points for m in marks), sum(m.score for m in marks)
+    given = score if total is None else total
+    lines.append((("total", str(points), f"{given:g}", "", ""), None))
     rows = "".join(
         f'<row r="{row}">'
         + "".join(_inline(f"{'ABCDE'[n]}{row}", word, style) for n, word in enumerate(cells))

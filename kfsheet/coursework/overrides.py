@@ -43,6 +43,9 @@ def _checked(line: dict[str, str], where: str, exercise: Exercise, ids: set[str]
         score = float(values["score"].replace(",", "."))
     except ValueError:
         raise DataError(f"{where}: the score {values['score']!r} is no number") from None
+    most = sum(q.points for q in exercise.questions if values["question"] in ("", q.name))
+    if not 0 <= score <= most:
+        raise DataError(f"{where}: the score {score:g} lies outside 0 to {most}")
     return {**values, "score": as_number(score, f"{where}: score")}
 
 

@@ -115,7 +115,17 @@ def question_pages(
         _put_question(page, FIRST + n, layout, question, values, right)
         _put_formulas(page, FIRST + n, n + 1, layout, question)
         _put_salt(hidden, n + 1, question, salt)
+    _put_task(page, FIRST + len(exercise.questions) + 1, exercise.task)
     return [page, hidden]
+
+
+def _put_task(page: Page, row: int, task: tuple[str, ...]) -> None:
+    if task:
+        page.put(row, 1, "What you need to know", "heading")
+    for line, words in enumerate(task, row + 1):
+        page.put(line, 1, words, "text", align="wrap")
+        page.merges.append(f"A{line}:H{line}")
+        page.heights[line] = 18 * (1 + len(words) // 150)
 
 
 def _put_question(

@@ -3,20 +3,31 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections import Counter, defaultdict
 from collections.abc import Iterable
 from html import escape
 from io import StringIO
+from itertools import cycle
 from pathlib import Path
+from textwrap import shorten
 
 from kfsheet.coursework.diagnosis import RIGHT
 from kfsheet.coursework.grading import STATUSES, Handed, Result
-from kfsheet.coursework.judge import Mark
-from kfsheet.coursework.marking import colour_of
+from kfsheet.coursework.judge import CREDIT, Mark
+from kfsheet.coursework.marking import colour_of, mark_workbook
+from kfsheet.coursework.places import Places
 from kfsheet.coursework.roster import harmless
+from kfsheet.coursework.submission import read_submission
 from kfsheet.exercise import Exercise
 from kfsheet.files import write_file
 
+COLOURS = {
+    1.0: ("#55A868",),
+    0.5: ("#F2C14E", "#E9A23B", "#D9BF77", "#F7DC9C"),
+    0.0: ("#C44E52", "#DD8A8C", "#A23B4A", "#8C8C8C", "#B0B0B0", "#6E6E6E", "#D0A0A0"),
+}
+"""Of a status, by the share of the points that it brings: green, yellow, red and grey."""
 STYLE = """<style>
 body { font: 15px/1.5 sans-serif; max-width: 60em; margin: 2em auto; color: #222; }
 table { border-collapse: collapse; } td, th { border: 1px solid #bbb; padding: .3em .6em;
@@ -36,7 +47,9 @@ def write_reports(
         marked = out / "work" / f"{result.key}.xlsx"
         target = out / "feedback" / f"{result.student.id}.xlsx"
         target.unlink(missing_ok=True)
-        if result.feedback and marked.is_file():
+        if result.feedback and result.changed:
+            write_file(target, _marked_anew(exercise, result))
+        elif result.feedback and marked.is_file():
             write_file(target, marked.read_bytes())
     tables = {
         "grades.csv": _grades(exercise, results),
@@ -46,6 +59,13 @@ def write_reports(
     written = [write_file(out / name, text.encode()) for name, text in tables.items()]
     page = _class_page(exercise, results, handed)
     return [*written, write_file(out / "class.html", page.encode())]
+
+
+def _marked_anew(exercise: Exercise, result: Result) -> bytes:
+    """The student's workbook with the marks that a lecturer has changed."""
+    book = read_submission(result.path)
+    places = Places.find(book, exercise.model)
+    return mark_workbook(result.path, book, places, result.marks, result.override)
 
 
 def _table(head: Iterable[str], lines: Iterable[Iterable[object]]) -> str:
@@ -92,7 +112,7 @@ def _canvas(exercise: Exercise, results: list[Result]) -> str:
     return _table(
         head,
         (
-            [r.student.name, r.student.id, r.student.email or r.student.id, "", _points(r.score)]
+            [r.student.name, "", r.student.email or r.student.id, "", _points(r.score)]
             for r in results
         ),
     )
@@ -146,6 +166,7 @@ def _class_page(exercise: Exercise, results: list[Result], handed: list[Handed])
     body += "<h2>Distribution</h2>" + _distribution(results)
     body += "<h2>Questions</h2>" + _question_plot(exercise, judged)
     body += _mistakes(exercise, judged)
+    body += "<h2>Most frequent mistakes</h2>" + _mistake_plot(judged)
     body += "<h2>Identical wrong answers</h2>" + _groups(judged)
     body += "<h2>Files that carry somebody else's token</h2>" + _foreign(results, handed)
     return _page(f"{exercise.title}: the class", body)
@@ -163,9 +184,31 @@ def _mistakes(exercise: Exercise, judged: list[Result]) -> str:
     return _html_table(("question", "right", "most frequent mistakes"), rows)
 
 
+def _mistake_plot(judged: list[Result]) -> str:
+    """How many students made each of the most frequent mistakes."""
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
+
+    marks = [m for r in judged for m in r.marks if m.status != RIGHT]
+    counts = Counter(f"{m.name}: {_kind(m)}" for m in marks).most_common(12)
+    if not counts:
+        return "<p>none</p>"
+    figure = Figure(figsize=(9, 0.6 + 0.4 * len(counts)), layout="constrained")
+    axes = figure.subplots()
+    words = [shorten(name, 70, placeholder=" ...") for name, _ in counts]
+    axes.barh(range(len(counts)), [count for _, count in counts], color="#D55E00")
+    axes.set_yticks(range(len(counts)), words, fontsize=8)
+    axes.invert_yaxis()
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_xlabel("students")
+    return _drawn(figure)
+
+
 def _kind(mark: Mark) -> str:
     """A mistake without the rows in which it stands."""
-    return f"{mark.status}: {mark.remark.rpartition(': ')[2]}" if mark.remark else mark.status
+    words = re.sub(r"^.*?(?:not in|every row refers to) [^:;]*[:;] ", "", mark.remark)
+    words = re.sub(r"as long as .* keeps? ", "as long as a parameter keeps ", words)
+    return f"{mark.status}: {words}" if words else mark.status
 
 
 def _groups(judged: list[Result]) -> str:
@@ -200,33 +243,41 @@ def _foreign(results: list[Result], handed: list[Handed]) -> str:
 
 def _distribution(results: list[Result]) -> str:
     from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
 
     figure = Figure(figsize=(7, 2.8), layout="constrained")
     axes = figure.subplots()
-    axes.hist([r.score for r in results], bins=20, range=(0, results[0].maximum), color="#0072B2")
-    axes.set_xlabel("score (points)")
+    judged = [r.score for r in results if r.status == "graded" or r.override is not None]
+    axes.hist(judged, bins=20, range=(0, results[0].maximum), color="#0072B2")
+    axes.set_xlabel("score (points) of those whose work was judged")
     axes.set_ylabel("students")
+    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     return _drawn(figure)
 
 
 def _question_plot(exercise: Exercise, judged: list[Result]) -> str:
     """Share of each status, question by question."""
     from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
 
     names = [q.name for q in exercise.questions]
     counts = {n: Counter(m.status for r in judged for m in r.marks if m.name == n) for n in names}
-    statuses = sorted({s for c in counts.values() for s in c}, key=lambda s: (s != RIGHT, s))
-    figure = Figure(figsize=(9, 3.2), layout="constrained")
+    found = {s for c in counts.values() for s in c}
+    statuses = sorted(found, key=lambda s: (-CREDIT.get(s, 0.0), s))
+    figure = Figure(figsize=(9, 3.4), layout="constrained")
     axes = figure.subplots()
     bottom = [0] * len(names)
+    shades = {credit: cycle(colours) for credit, colours in COLOURS.items()}
     for status in statuses:
         heights = [counts[name][status] for name in names]
-        axes.bar(names, heights, bottom=bottom, label=status)
+        colour = next(shades[CREDIT.get(status, 0.0)])
+        axes.bar(names, heights, bottom=bottom, label=status, color=colour, edgecolor="white")
         bottom = [b + h for b, h in zip(bottom, heights, strict=True)]
     axes.set_ylabel("students")
     axes.tick_params(axis="x", rotation=45)
+    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     if statuses:
-        axes.legend(fontsize=8, ncols=2)
+        axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.01, 0.5))
     return _drawn(figure)
 
 

@@ -17,7 +17,7 @@ from sympy import Abs, Expr, IndexedBase, Piecewise, diag, sign, sqrt
 from kfsheet.algebra import analysis
 from kfsheet.errors import DataError
 from kfsheet.exercise import Exercise
-from kfsheet.exercises._football_sheets import ABOUT, CHARTS, QUESTIONS, SECTIONS
+from kfsheet.exercises._football_sheets import ABOUT, CHARTS, QUESTIONS, SECTIONS, TASK
 from kfsheet.expressions import RMS, Last, Mean, Missing, Std, t, when_observed
 from kfsheet.recurrence import Recurrence
 from kfsheet.tables import Table, read_table
@@ -287,6 +287,7 @@ exercise = Exercise(
     source="Course exercise 'Reanalysis of a football kick using the Kalman Filter'",
     charts=CHARTS,
     questions=QUESTIONS,
+    task=TASK,
     notebook="notebooks/01_football.ipynb",
     sections=SECTIONS,
     vary={
@@ -299,6 +300,7 @@ exercise = Exercise(
         "b_z": (0.006, 0.02),
     },
     frozen=("Free run",),
-    veiled=("u_next", "w_next"),  # u and w of the next step
+    # u and w of the next step, and what holds the denominator of the gains.
+    veiled=("u_next", "w_next", "sigma_d_i", "sigma_d_j", "p_x", "p_z"),
     draw=draw_kick,
 )
