@@ -576,8 +576,7 @@ def what_if(**parameters):
     _, axes = plt.subplots(1, 2, figsize=(12, 3.8), layout="constrained")
     kf.draw(CHARTS["The flight"], run, axes[0])
     kf.draw(CHARTS["Height"], run, axes[1])
-    if not run.attrs["scalars"]["landed"]:
-        axes[0].set_title("still in the air in the last row")
+    axes[0].set_title("The flight" if run.attrs["scalars"]["landed"] else "still in the air")
 
 
 # %% [markdown]
