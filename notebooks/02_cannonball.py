@@ -545,17 +545,17 @@ pd.DataFrame({Phi: distrust(Phi) for Phi in (0, 1, 10, 100)}, index=index).round
 # The more noise a filter suspects, the more it follows the radar's. The NIS hardly moves: an
 # innovation is mostly the radar's error, whatever the filter thinks of its model. The NEES falls to
 # half at once, far below its bounds of 3.62 and 4.40: such a filter errs less than it claims. But
-# the NEES needs a truth. See exercise 6 for the other direction. One flight, close up:
+# the NEES needs a truth. See exercise 6 for the other direction. One flight, its velocity:
 
 # %%
 fig, axes = plt.subplots(1, 2, figsize=(12, 3.8), sharey=True, layout="constrained")
 for Phi, ax in zip((0, 10), axes, strict=True):
-    kf.draw(CHARTS["Distance, close up"], kf.evaluate(cannonball, Phi_s=Phi), ax)
-    ax.set(title=f"$\\Phi_s$ = {Phi} m²/s³", ylim=(-120, 120))
+    kf.draw(CHARTS["Horizontal velocity"], kf.evaluate(cannonball, Phi_s=Phi), ax)
+    ax.set(title=f"$\\Phi_s$ = {Phi} m²/s³", ylim=(-20, 20))
 
 # %% [markdown]
-# On the right both are wider, the error and the band: the filter never rests. The band has grown
-# more than the error has, which is what the NEES says.
+# On the right both are wider, the error and the band: the filter never rests. But the band has
+# grown more than the error, which seldom fills half of it: that is what the NEES says.
 #
 # ## What if
 #
