@@ -62,11 +62,15 @@ class Chart:
     origin_top_left: bool = False
     y_limits: tuple[float, float] | None = None
     """Lowest and highest y, where a few large values would hide the rest."""
+    where: str = ""
+    """A column that is 0 in rows that are not drawn: what a ball would do underground."""
 
     def check(self, model: Recurrence) -> None:
         """Refuse a chart of columns or roles that do not exist."""
         if not isinstance(self.series, tuple) or not self.series:
             raise ModelError(f"chart {self.title!r}: series must be a tuple of at least one Series")
+        if self.where:
+            model.column(self.where)
         for series in self.series:
             model.column(series.x), model.column(series.y)
             if series.role not in LOOKS:

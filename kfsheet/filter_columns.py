@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from kfsheet.kalman import Observation, StateSpace
     from kfsheet.recurrence import Recurrence
 
-MOST_SHARES = 2  # of NIS within one formula, where observations may be missing
+MOST_ASKED = 2  # cells that may be missing, in the formula of NIS; more give shares columns
 MOST_TERMS = 6  # of a product of matrices within one formula; more get columns of their own
 
 
@@ -254,7 +254,7 @@ class FilterColumns(FilterCells):
         ]
         seen = [And(*map(Observed, asked)) for _, _, asked in self.weighed]
         missing_some = len(parts) > 1 and Or(*seen) != True  # noqa: E712 - a SymPy condition
-        if missing_some and len(parts) > MOST_SHARES:
+        if missing_some and sum(len(asked) for _, _, asked in self.weighed) > MOST_ASKED:
             for n, (part, o) in enumerate(zip(parts, self.model.observations, strict=True)):
                 yield self.column(f"NIS_{o.name}", part, parse_unit(""), f"share of {o.name}")
                 parts[n] = self.cell(f"NIS_{o.name}")

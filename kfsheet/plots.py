@@ -35,9 +35,12 @@ def draw(chart: Chart, frame: pd.DataFrame, ax: Axes | None = None) -> Axes:
     import matplotlib.pyplot as plt
 
     wanted = {name for series in chart.series for name in (series.x, series.y)}
+    wanted |= {chart.where} - {""}
     if missing := sorted(wanted - set(frame.columns)):
         raise DataError(f"chart {chart.title!r} needs column {missing[0]}, which the frame lacks")
     ax = ax or plt.subplots(figsize=(7, 4), layout="constrained")[1]
+    if chart.where:
+        frame = frame.where(frame[chart.where] != 0)
     for series in chart.series:
         look = LOOKS[series.role]
         ax.plot(

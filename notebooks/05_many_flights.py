@@ -87,7 +87,7 @@ pd.DataFrame(ratio).iloc[[0, 1, 10, 100, 600, 1319]].round(3)
 
 # %%
 coverage = {a: study.rows[f"inside_{a}"]["mean"] for a in "xy"}
-pd.DataFrame(coverage).iloc[[1, 10, 100, 600, 1319]].round(3)
+pd.DataFrame(coverage).iloc[[1, 10, 100, 600, 1319]].round(4)
 
 # %% [markdown]
 # ## NIS and NEES, with narrow bounds

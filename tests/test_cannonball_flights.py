@@ -19,12 +19,12 @@ def frame():
     return evaluate(cannonball)
 
 
-def as_listed(frame, learns):
+def as_listed(frame, learns=True, slope=radar_slope):
     """The article's equations in matrices; its list ends before an update of P."""
     x, P, states = START, P_0, [START]
     for row in range(1, len(frame)):
         x, P = F @ x + FALL, F @ P @ F.T
-        H = radar_slope(x)
+        H = slope(x)
         K = P @ H.T @ np.linalg.inv(H @ P @ H.T + np.diag([0.01**2, 30.48**2]))
         d = frame.loc[row, ["theta_obs", "r_obs"]].to_numpy(float) - radar(x)
         d[0] = math.remainder(d[0], 2 * math.pi)
@@ -46,6 +46,18 @@ def test_a_filter_whose_covariance_is_never_updated_is_the_radar_alone(frame):
         assert rms(wrong[:, k]) > 10 * rms(right[:, k])
         # What it claims is the error of a forecast that has seen nothing since the shot.
         assert P[k, k] == pytest.approx(304.8**2 + (30.48 * DT * (N - 1)) ** 2)
+
+
+def test_the_missing_minus_costs_the_filter_most_of_what_it_knows(frame):
+    """d(theta)/dx as printed, on the same echoes: the angle corrects x to the wrong side."""
+
+    def printed_slope(x):
+        return radar_slope(x) * [[-1, 1, 1, 1], [1, 1, 1, 1]]
+
+    wrong, _ = as_listed(frame, slope=printed_slope)
+    for name, k, times in (("x", 0, 5), ("y", 2, 3)):
+        assert rms(wrong[:, k]) > times * rms(frame[f"e_{name}_a"])
+    assert_close(frame["e_x_a"], as_listed(frame)[0][:, 0], 1e-8)
 
 
 ERRORS = ("e_x_a", "e_y_a", "e_x_obs", "e_y_obs")
@@ -116,6 +128,22 @@ def test_the_filter_errs_as_much_as_it_says(ours):
     for row in (0, 1, 10, 100, 470, 900, N - 1):
         # In row 0 the error is one number that the parameters give: one claimed sigma each.
         assert nees[row] == pytest.approx(4) if row == 0 else low < nees[row] * flights < high
+
+
+def test_a_needless_noise_of_the_model_shows_in_the_nees_and_hardly_in_the_nis(ours):
+    """A filter that expects more than it meets claims too much: its NEES is too small."""
+    nervous = ensembles(5, Phi_s=1)
+    low, high = chi2.interval(0.999, 4 * FLIGHTS * len(nervous))
+    sums = np.mean([line["NEES"] for line in nervous], axis=0)[1:] * FLIGHTS * len(nervous)
+    assert (sums < low).mean() > 0.9
+    honest = np.mean([line["NEES"] for line in ours[:5]], axis=0)[1:] * FLIGHTS * 5
+    assert (honest < low).mean() < 0.05
+    # The NIS of a single flight, 1,319 sweeps, cannot tell the two apart.
+    one_flight = math.sqrt(4 / (N - 1))
+    means = [np.mean([line["NIS"][1:] for line in lines]) for lines in (nervous, ours[:5])]
+    assert 0 < means[1] - means[0] < one_flight
+    errors = [np.mean([line["e_x_a flight"] for line in lines]) for lines in (nervous, ours[:5])]
+    assert errors[0] > 1.2 * errors[1]
 
 
 def test_600_m_to_10_m_belongs_to_30_m_not_to_30_km(ours, frame):

@@ -10,7 +10,7 @@ import pytest
 from filterpy.kalman import ExtendedKalmanFilter
 from hypothesis import given
 from hypothesis import strategies as st
-from sympy import Matrix, Rational, Symbol, atan2, diag, eye, sqrt, symbols, zeros
+from sympy import Matrix, Rational, Symbol, atan2, diag, eye, pi, sqrt, symbols, zeros
 
 from kfsheet import (
     Intermediate,
@@ -400,6 +400,16 @@ def test_a_wrapped_angle_is_the_same_direction_within_half_a_turn(angle):
     assert -math.pi <= found <= math.pi
     difference = found - math.remainder(angle, 2 * math.pi)
     assert min(abs(difference), abs(abs(difference) - 2 * math.pi)) < 1e-12
+
+
+def test_half_a_turn_to_either_side_is_plus_pi():
+    """The end of (-pi, pi] that belongs to it, in symbols and in floating-point numbers."""
+    m = Recurrence("half_turns", title="Half a turn, and one and a half")
+    angle = m.data("angle", [math.pi, -math.pi], "rad", "half a turn", section="Turns")
+    (same,) = m.columns("same", section="Turns")
+    m.define(same[t], wrapped(angle[t]), "rad", "wrapped")
+    assert evaluate(m)["same"].tolist() == [math.pi, math.pi]
+    assert {wrapped(n * pi) for n in (-3, -1, 1, 3)} == {pi}
 
 
 X = Symbol("x", real=True)

@@ -6,6 +6,7 @@ The same composition is what :mod:`kfsheet.excel.workbook` writes and what
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -143,13 +144,20 @@ def _line(page: Page, row: int, column: int, item: Any, value: Piece) -> None:
     page.put(row, column + 2, item.description, "words", align="wrap")
 
 
-def plotted(exercise: Exercise) -> list[str]:
-    """Formula columns on charts that may have no value; a chart would show their "" as 0."""
-    names = [n for chart in exercise.charts for s in chart.series for n in (s.x, s.y)]
-    columns = {name: exercise.model.column(name) for name in names}
-    return [
-        n for n, c in columns.items() if any(r is not Missing and r.has(Missing) for r in c.rules)
-    ]
+def plotted(exercise: Exercise) -> list[tuple[str, str]]:
+    """Formula columns on charts that may have no value; a chart would show their "" as 0.
+
+    Each with the column that is 0 where it is not drawn, ``""`` if it has gaps of its own.
+    """
+    found = {}
+    for chart in exercise.charts:
+        for name in (n for s in chart.series for n in (s.x, s.y)):
+            rules = exercise.model.column(name).rules
+            if any(r is not Missing and r.has(Missing) for r in rules):
+                found[name, ""] = None
+            elif chart.where:
+                found[name, chart.where] = None
+    return list(found)
 
 
 PLOTTED_COLUMN = 27  # AA: to the right of the charts
@@ -164,29 +172,44 @@ def charts_page(exercise: Exercise, layout: Layout, now: Run) -> Page:
     names = plotted(exercise)
     if names:
         page.put(2, 1, "The columns from AA on are plotted where a value may be missing.")
-    for at, name in enumerate(names, PLOTTED_COLUMN):
+    for at, (name, where) in enumerate(names, PLOTTED_COLUMN):
         column = exercise.model.column(name)
-        _head(page, at, name, column.unit, "plotted")
-        page.columns[at] = _plotted(layout, name, now)
+        _head(
+            page, at, name, column.unit, f"plotted where {where} is not 0" if where else "plotted"
+        )
+        page.columns[at] = _plotted(layout, name, where, now)
     return page
 
 
-def _plotted(layout: Layout, name: str, now: Run) -> Filled:
-    sheet, number = layout.home(name)
-    cells = f"{quote(sheet)}!{get_column_letter(number)}"
+def _plotted(layout: Layout, name: str, where: str, now: Run) -> Filled:
+    cells, mask = (_cells(layout, n) if n else "" for n in (name, where))
 
     def rule(row: int) -> str:
-        return f"=IF(ISNUMBER({cells}{row}),{cells}{row},NA())"
+        asked = f"ISNUMBER({cells}{row})"
+        asked = f"AND({asked},{mask}{row}<>0)" if where else asked
+        return f"=IF({asked},{cells}{row},NA())"
 
     values = now.columns[name]
-    shape, size = number_format(values), now.figure(rms, name)
+    if where:
+        drawn = zip(values, now.columns[where], strict=True)
+        values = [value if shown else math.nan for value, shown in drawn]
+    shape, size = number_format(values), rms(values)
     return Filled(FIRST_ROW, values, "formula", shape, size, (rule,), NOT_AVAILABLE)
 
 
-def chart_range(exercise: Exercise, layout: Layout, name: str) -> tuple[str, int]:
-    """Sheet and column number from which a chart takes a column."""
+def _cells(layout: Layout, name: str) -> str:
+    """Sheet and letter of a column, as a formula on another sheet reads it."""
+    sheet, number = layout.home(name)
+    return f"{quote(sheet)}!{get_column_letter(number)}"
+
+
+def chart_range(exercise: Exercise, layout: Layout, name: str, where: str = "") -> tuple[str, int]:
+    """Sheet and column number from which a chart, with its ``where``, takes a column."""
     names = plotted(exercise)
-    return ("Charts", PLOTTED_COLUMN + names.index(name)) if name in names else layout.home(name)
+    for copy in ((name, ""), (name, where)):
+        if copy in names:
+            return "Charts", PLOTTED_COLUMN + names.index(copy)
+    return layout.home(name)
 
 
 CHARACTERS_A_LINE = 130  # of the two columns of "Read me" together

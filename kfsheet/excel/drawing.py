@@ -33,6 +33,7 @@ from kfsheet.exercise import Exercise
 WIDTH, HEIGHT = 17.0, 11.0  # cm
 COLUMN_WIDTH, ROW_HEIGHT = 9.0, 15.0  # said, since programs differ in what they take for granted
 POINT = 12_700  # English metric units
+ANY = -1  # index of a series, which openpyxl fills in and then leaves its order alone
 
 
 def draw(book: Workbook, exercise: Exercise, layout: Layout) -> None:
@@ -42,7 +43,10 @@ def draw(book: Workbook, exercise: Exercise, layout: Layout) -> None:
         sheet.column_dimensions[get_column_letter(column)].width = COLUMN_WIDTH
     sheet.sheet_format.defaultRowHeight, sheet.sheet_format.customHeight = ROW_HEIGHT, True
     sheet.page_setup.fitToHeight = 1
-    rows = FIRST_CHART_ROW + ROWS_A_CHART * -(-len(exercise.charts) // 2)
+    pairs = -(-len(exercise.charts) // 2)
+    if pairs * HEIGHT > 2 * WIDTH:
+        sheet.page_setup.orientation = "portrait"
+    rows = FIRST_CHART_ROW + ROWS_A_CHART * pairs
     sheet.print_area = f"A1:{get_column_letter(2 * CHART_COLUMNS[1] - 2)}{rows}"
     for n, chart in enumerate(exercise.charts):
         row, column = chart_place(n)
@@ -64,12 +68,15 @@ def _native(book: Workbook, exercise: Exercise, layout: Layout, chart: Chart) ->
     if chart.origin_top_left:
         native.y_axis.scaling.orientation = "maxMin"
         native.x_axis.tickLblPos = "nextTo"
-    unlabelled = []
     for n, series in enumerate(chart.series):
-        native.series.append(_series(book, exercise, layout, series))
-        if not series.label:
-            unlabelled.append(n)
-    _hide_from_legend(native, unlabelled)
+        native.series.append(_series(book, exercise, layout, series, chart.where))
+        native.series[-1].order, native.series[-1].idx = n, ANY
+    if any(series.role == "cloud" for series in chart.series):
+        # The last is on top: in Excel by its order, in LibreOffice where it comes first in the
+        # file. A legend's entries are counted in either way, so here none can be hidden.
+        native.series.reverse()
+    else:
+        _hide_from_legend(native, [n for n, s in enumerate(chart.series) if not s.label])
     return native
 
 
@@ -85,8 +92,13 @@ def _hide_from_legend(native: ScatterChart, indices: list[int]) -> None:
     native.legend.legendEntry = [LegendEntry(idx=n, delete=True) for n in indices]
 
 
-def _series(book: Workbook, exercise: Exercise, layout: Layout, series: Series) -> NativeSeries:
-    x, y = (_reference(book, exercise, layout, name) for name in (series.x, series.y))
+def _series(
+    book: Workbook, exercise: Exercise, layout: Layout, series: Series, where: str
+) -> NativeSeries:
+    x, y = (
+        _reference(book, layout, chart_range(exercise, layout, name, where))
+        for name in (series.x, series.y)
+    )
     native = NativeSeries(y, x, title=series.label or series.y)
     look = LOOKS[series.role]
     native.graphicalProperties = _line(look)
@@ -94,7 +106,11 @@ def _series(book: Workbook, exercise: Exercise, layout: Layout, series: Series) 
     if look.marker:
         native.marker.size = look.size
         native.marker.graphicalProperties = GraphicalProperties(solidFill=look.colour)
-        native.marker.graphicalProperties.line.solidFill = look.colour
+        edge = native.marker.graphicalProperties.line
+        if series.role == "cloud":
+            edge.noFill = True  # it would double the size of a small dot
+        else:
+            edge.solidFill = look.colour
     native.smooth = False
     return native
 
@@ -109,8 +125,8 @@ def _line(look: Look) -> GraphicalProperties:
     return GraphicalProperties(ln=line)
 
 
-def _reference(book: Workbook, exercise: Exercise, layout: Layout, name: str) -> Reference:
-    sheet, column = chart_range(exercise, layout, name)
+def _reference(book: Workbook, layout: Layout, place: tuple[str, int]) -> Reference:
+    sheet, column = place
     return Reference(
         book[sheet], min_col=column, min_row=FIRST_ROW, max_row=layout.last_row, max_col=column
     )

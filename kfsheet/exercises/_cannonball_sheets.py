@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from kfsheet.charts import Chart, Series
 from kfsheet.exercise import Question
 
@@ -52,8 +54,11 @@ def _over_time(
     return Chart(title, "time (s)", label, series, note=note, y_limits=limits)
 
 
-def _cloud(name: str) -> tuple[Series]:
-    return (Series("time", f"e_{name}_obs", "radar alone", "cloud"),)
+def _in_a_cloud(name: str) -> tuple[Series, ...]:
+    """The filter's error among the radar's, within its band."""
+    cloud = Series("time", f"e_{name}_obs", "radar alone", "cloud")
+    error, low, high = _claimed("a", f"e_{name}_a")
+    return cloud, replace(low, label="-2 sigma"), replace(high, label="+2 sigma"), error
 
 
 FLIGHT = (
@@ -68,6 +73,7 @@ CHARTS = (
         "y: height (m)",
         FLIGHT,
         note="Radar positions scatter by 500 m and more; the filter lies on the path.",
+        where="in_flight",
     ),
     _over_time(
         "Is the filter honest?",
@@ -92,13 +98,13 @@ CHARTS = (
     _over_time(
         "Distance",
         "error of x (m)",
-        _cloud("x") + _claimed("a", "e_x_a"),
+        _in_a_cloud("x"),
         "Errors: radar alone, and the EKF's.",
     ),
     _over_time(
         "Height",
         "error of y (m)",
-        _cloud("y") + _claimed("a", "e_y_a"),
+        _in_a_cloud("y"),
         "The same for the height.",
     ),
     _over_time(

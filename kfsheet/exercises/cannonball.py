@@ -89,7 +89,7 @@ def _truth(m: Recurrence) -> None:
     angle = m["angle"] * pi / 180
     page = "Truth"
     x, vx, y, vy = m.columns("x_true", "vx_true", "y_true", "vy_true", section=page)
-    (in_flight,) = m.columns("in_flight", section=page)
+    (in_flight,) = m.columns("in_flight", section="Radar")
     m.define(x[t], x[t - 1] + vx[t - 1] * dt, "m", "truth, distance", start=[0])
     m.define(vx[t], vx[t - 1], "m/s", "truth, horizontal velocity", start=[v_0 * cos(angle)])
     trapezium = (vy[t - 1] + vy[t]) * dt / 2
@@ -104,7 +104,7 @@ def _landing(m: Recurrence) -> None:
     """Whether the table is long enough: one more step would bring the ball below 0."""
     y, vy, g, dt = m["y_true", "vy_true", "g", "dt"]
     next_y = Last(y) + Last(vy) * dt - g * dt**2 / 2
-    words = "1: the ball lands; 0: it is in the air in the last row, make dt larger"
+    words = "1: the ball lands; 0: still in the air, make dt larger: 2 v_0 sin(angle)/(g 1319)"
     m.summary("landed", Piecewise((1, next_y < 0), (0, True)), "", words)
     m.summary("flight", Sum(m["in_flight"]), "", "rows with the ball in the air")
 
@@ -121,12 +121,14 @@ def _radar(m: Recurrence, noise: Table, arctangent: Arctangent) -> None:
     theta, r, theta_obs, r_obs, x_obs, y_obs, r_x, r_y = m.columns(
         "theta", "r", "theta_obs", "r_obs", "x_obs", "y_obs", "r_x", "r_y", section=page
     )
-    m.define(theta[t], arctangent(y[t] - y_R, x[t] - x_R), "rad", "truth, angle")
-    m.define(r[t], sqrt((x[t] - x_R) ** 2 + (y[t] - y_R) ** 2), "m", "truth, range")
+    # No echo of the shot: of a ball that lies in the radar there is no angle.
+    shot = [Missing]
+    m.define(theta[t], arctangent(y[t] - y_R, x[t] - x_R), "rad", "truth, angle", start=shot)
+    m.define(r[t], sqrt((x[t] - x_R) ** 2 + (y[t] - y_R) ** 2), "m", "truth, range", start=shot)
     for true, seen, sigma, draw in ((theta, theta_obs, s_theta, n_theta), (r, r_obs, s_r, n_r)):
         measured = _while_flying(m, true[t] + sigma * draw[t])
         unit, words = ("rad", "angle") if true is theta else ("m", "range")
-        m.define(seen[t], measured, unit, f"measured {words}: truth + noise")
+        m.define(seen[t], measured, unit, f"measured {words}: truth + noise", start=shot)
     angle, reach, both = theta_obs[t], r_obs[t], (theta_obs[t], r_obs[t])
     position = Matrix([x_R + reach * cos(angle), y_R + reach * sin(angle)])
     m.define(x_obs[t], when_observed(both, position[0]), "m", "measured position, distance")
