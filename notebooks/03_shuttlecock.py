@@ -25,7 +25,7 @@ from sympy import Eq, Function, LambertW, Matrix, dsolve, exp, init_printing, so
 import kfsheet as kf
 
 # %%
-from kfsheet.drag import distorted, fall_argument, fall_asymptote, flight, lambert_step
+from kfsheet import drag
 from kfsheet.exercises.shuttlecock import FORECASTS, exercise, shuttlecock
 from kfsheet.shuttlecock.filters import joint_model
 
@@ -86,14 +86,14 @@ print(f"{speed:.2f} m/s in place of 4")
 # second derivation that must agree with the first, on every axis.
 
 # %%
-track = flight(k, g, tau, X)
+track = drag.flight(k, g, tau, X)
 track
 
 # %%
 height = solved["z"].rhs
 for axis, p_0, v_0 in zip("xyz", start[::2], start[1::2], strict=True):
-    position = (flight(k, pull[axis], tau, X) * Matrix([p_0, v_0, 1]))[0]
-    assert (position.subs(X, distorted(k, tau)) - solved[axis].rhs).expand() == 0
+    position = (drag.flight(k, pull[axis], tau, X) * Matrix([p_0, v_0, 1]))[0]
+    assert (position.subs(X, drag.distorted(k, tau)) - solved[axis].rhs).expand() == 0
 position
 
 # %% [markdown]
@@ -167,7 +167,7 @@ display(A.row(2) + shuttlecock["k_fit"] * A.row(1), A.rank())
 
 # %%
 A_T = A.subs({shuttlecock["dt"]: T, shuttlecock["k_fit"]: k})
-two = flight(k, 0, T, distorted(k, T)) * Matrix([p, v, 1])
+two = drag.flight(k, 0, T, drag.distorted(k, T)) * Matrix([p, v, 1])
 error = A_T * Matrix([p, v, -k * v]) - Matrix([*two, -k * two[1]])
 Matrix([e.series(T, 0, 4).removeO() for e in error])
 
@@ -254,7 +254,7 @@ print(f"mean NIS {scalars['mean_NIS']:.2f}, with honest variances {scalars['mean
 # takes: Lambert's $W$, the inverse of $W e^W$.
 
 # %%
-(moment,) = solve(position.subs(X, distorted(k, tau)), tau)
+(moment,) = solve(position.subs(X, drag.distorted(k, tau)), tau)
 moment
 
 # %% [markdown]
@@ -262,8 +262,8 @@ moment
 # confirms that the two say the same.
 
 # %%
-c = fall_asymptote(k, g, p_z, v_z)
-w_z = fall_argument(k, g, v_z, c)
+c = drag.fall_asymptote(k, g, p_z, v_z)
+w_z = drag.fall_argument(k, g, v_z, c)
 assert (moment - (c + LambertW(w_z)) / k).simplify() == 0
 display(c, w_z)
 
@@ -274,23 +274,37 @@ display(c, w_z)
 # %%
 W, w = symbols("W w", real=True)
 step = kf.newton_step(w * exp(-W) - W, W)
-assert step == lambert_step(W, w)
+assert step == drag.lambert_step(W, w)
 step
 
 # %% [markdown]
-# It starts from $W = 0$, the moment at which the flight's asymptote, a fall at terminal velocity,
-# would end. SciPy knows $W$ to all digits. How many steps are needed?
+# And where do they start? $W$ has two branches, the way up and the way down, which meet at
+# $W = -1$, $w = -1/e$. Weak drag leads there, and a tangent near a maximum is a poor guide. So we
+# expand: $1 + e w$ is a parabola in $W + 1$.
 
 # %%
-number = float(w_z.subs({k: 1, g: 9.80665, p_z: 0.5, v_z: 4}))
-guess = 0.0
-for steps in range(1, 6):
-    guess = float(step.subs({W: guess, w: number}))
-    print(f"{steps}: W = {guess:.12f}, {abs(guess - lambertw(number).real):.0e} off")
+s = symbols("s", real=True)
+display((1 + (s - 1) * exp(s)).series(s, 0, 4))
+drag.lambert_start(symbols("reach", positive=True))
 
 # %% [markdown]
-# Five steps give all digits; the sheet has eight, for weak drag. Now every frame: the sheet's fall
-# times, by Newton's steps, against SciPy's $W$ of the fitted start.
+# The *reach* is $1 + e w$; a flight with a negative one stays below. The sheet's first guess has
+# the parabola's root and its next term, and grows like a logarithm, as $W$ does. SciPy knows $W$ to
+# all digits. How many steps are needed, from the guess and from 0?
+
+# %%
+for slow in (1, 0.01):
+    number = float(w_z.subs({k: slow, g: 9.80665, p_z: 0.5, v_z: 4}))
+    guesses = [float(drag.lambert_start(1 + np.e * number)), 0.0]
+    for steps in range(4):
+        off = [abs(guess - lambertw(number).real) / slow for guess in guesses]
+        print(f"k = {slow}, {steps} steps: {off[0]:.0e} s off, from 0 {off[1]:.0e} s")
+        guesses = [float(step.subs({W: guess, w: number})) for guess in guesses]
+
+# %% [markdown]
+# From the guess, two steps leave $10^{-12}$ s at most; from 0, weak drag makes each step halve the
+# error, and no more. The sheet takes four, for wild fits. Now every frame: its fall times against
+# SciPy's $W$ of the fitted start.
 
 # %%
 v_fit, p_fit = run["v_z_raw"][1:], run["p_z_raw"][1:]
@@ -647,8 +661,8 @@ pairs.round(4)
 # %%
 WORLDS = {
     "sound": {},
-    "30 % too little drag": {"e_k": -0.3},
-    "twice the drag": {"e_k": 1},
+    "30 % too little drag": {"f_k": 0.7},
+    "twice the drag": {"f_k": 2},
     "quadratic drag": {"k_2": 0.2},
 }
 DOUBTS = (0, 0.05, 0.5)
@@ -807,11 +821,11 @@ from ipywidgets import FloatSlider, interact
 
 @interact(
     SNR=FloatSlider(25, min=4, max=100),
-    e_k=FloatSlider(0, min=-0.5, max=2),
+    f_k=FloatSlider(1, min=0.5, max=3),
     Phi_s=FloatSlider(0, min=0, max=1, step=0.05),
 )
-def what_if(SNR, e_k, Phi_s):
-    run = kf.evaluate(shuttlecock, SNR=SNR, e_k=e_k, Phi_s=Phi_s)
+def what_if(SNR, f_k, Phi_s):
+    run = kf.evaluate(shuttlecock, SNR=SNR, f_k=f_k, Phi_s=Phi_s)
     _, axes = plt.subplots(1, 2, figsize=(12, 3.8), layout="constrained")
     kf.draw(CHARTS["Velocity upwards"], run, axes[0])
     kf.draw(CHARTS["The fall point, from latest states"], run, axes[1])

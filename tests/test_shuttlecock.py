@@ -313,7 +313,7 @@ def test_without_noise_every_fit_is_the_truth():
 
 
 @pytest.mark.parametrize(
-    "parameters", [{}, {"k_m": 0.2}, {"e_k": 1}, {"z_fall": -2}, {"k_2": 0.4}], ids=str
+    "parameters", [{}, {"k_m": 0.2}, {"f_k": 2}, {"z_fall": -2}, {"k_2": 0.4}], ids=str
 )
 def test_newton_in_cells_finds_the_fall_that_a_bracketing_root_finder_finds(parameters):
     f = evaluate(shuttlecock, **parameters)

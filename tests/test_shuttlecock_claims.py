@@ -188,8 +188,8 @@ def test_the_latest_state_of_the_three_state_filter_forgets(sound):
 
 WORLDS = {
     "sound": {},
-    "drag too small": {"e_k": -0.3},
-    "twice": {"e_k": 1},
+    "drag too small": {"f_k": 0.7},
+    "twice": {"f_k": 2},
     "quadratic": {"k_2": 0.2},
 }
 
@@ -204,7 +204,7 @@ def test_an_exact_filter_without_doubt_ties_with_the_fit_in_every_world(world):
 def test_a_little_doubt_is_nearly_free_and_wins_if_the_drag_is_twice_too_large():
     mean, error = gain(exact_and_raw(Phi_s=0.05), "ex", "raw", LATE)
     assert mean - 4 * error > -0.1
-    assert wins(exact_and_raw(e_k=1, Phi_s=0.05), "ex", "raw", LATE, by=6)
+    assert wins(exact_and_raw(f_k=2, Phi_s=0.05), "ex", "raw", LATE, by=6)
 
 
 @pytest.mark.parametrize("world", WORLDS)

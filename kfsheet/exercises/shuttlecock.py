@@ -21,6 +21,7 @@ from kfsheet.kalman import add_filter
 from kfsheet.recurrence import Recurrence
 from kfsheet.shuttlecock.filters import AXES, WAYS, exact_model, joint_model
 from kfsheet.shuttlecock.forecasts import (
+    NEWTON_STEPS,
     add_fit,
     add_landing,
     add_latest,
@@ -74,7 +75,9 @@ def _parameters(m: Recurrence) -> None:
     m.parameter(
         "k_2", 0, "1/m", "drag over mass, quadratic, of the truth alone", sign="nonnegative"
     )
-    e_k = m.parameter("e_k", 0, "1/s", "error of the drag over mass that filters and fits assume")
+    f_k = m.parameter(
+        "f_k", 1, "", "drag that filters and fits assume, in units of k_m", sign="positive"
+    )
     m.parameter("g", 9.80665, "m/s2", "gravity", sign="positive")
     for axis, p, v in (("x", 0, 1.5), ("y", 0, 0.8), ("z", 0.5, 4)):
         m.parameter(f"p_{axis}", p, "m", f"start, {AXES[axis]}")
@@ -90,7 +93,7 @@ def _parameters(m: Recurrence) -> None:
     m.parameter("Phi_s", 0, "m2/s3", "exact filter, spectral density", sign="nonnegative")
     m.parameter("gate", 1000, "", "exact filter, sigmas beyond which it ignores", sign="positive")
     dt = m.derived("dt", 1 / fps, "s", "time between two frames")
-    k_fit = m.derived("k_fit", k_m + e_k, "1/s", "drag over mass that filters and fits assume")
+    k_fit = m.derived("k_fit", f_k * k_m, "1/s", "drag over mass that filters and fits assume")
     m.derived("X_dt", distorted(k_fit, dt), "s", "distorted time between two frames")
     m.time(t * dt, "s", "time since the first frame")
 
@@ -156,7 +159,7 @@ ABOUT = (
     "Look at both fits on the sheet Charts: 'Fit raw' takes the positions as the cameras saw them, "
     "'Fit filtered' as the filter of the sheet Kalman corrected them. The filter's positions are "
     "indeed better than the cameras'. Are its fall points?",
-    "Try this on the sheet Parameters: set e_k to 1 (filters and fits now believe in twice the "
+    "Try this on the sheet Parameters: set f_k to 2 (filters and fits now believe in twice the "
     "drag) or k_2 to 0.2 (quadratic drag in the truth); then let the exact filter doubt: set Phi_s "
     "to 0.05 or 0.5. Or type 15 over one of the green draws on the sheet Camera, an outlier, and "
     "set gate to 3. When does a filter win?",
@@ -235,7 +238,7 @@ QUESTIONS = (
     Question("drop", 2, "The part of the height that does not depend on p_z and v_z."),
     Question("v_z_raw", 2, "Solve the two normal equations for the slope."),
     Question("p_z_raw", 2, "Solve the two normal equations for the constant."),
-    Question("W_1_raw", 2, "One step of Newton's method from 0."),
+    Question("W_1_raw", 2, "From W_0, one step of Newton's method for w exp(-W) - W = 0."),
     Question("t_fall_raw", 1, "From W back to seconds."),
     Question("x_fall_raw", 1, "The track at t_fall."),
 )
@@ -243,8 +246,12 @@ ASKED_OF_Z = (
     *("z_f", "vz_f", "az_f", "d_z", "S_z", "K_z_z", "K_vz_z", "z_a", "P_zz_a"),
     *("p_z_raw", "v_z_raw"),
 )
-# What is asked of z stands beside it for x and y.
-TWINS = (*(name.replace("z", axis) for axis in "xy" for name in ASKED_OF_Z), "y_fall_raw")
+# What is asked of z stands beside it for x and y, and one step of Newton's is like another.
+TWINS = (
+    *(name.replace("z", axis) for axis in "xy" for name in ASKED_OF_Z),
+    "y_fall_raw",
+    *(f"W_{n}_raw" for n in range(2, NEWTON_STEPS + 1)),
+)
 exercise = Exercise(
     model=shuttlecock,
     about=ABOUT,
