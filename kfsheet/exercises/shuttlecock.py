@@ -59,8 +59,8 @@ def build_model(draws: str | Path = DATA / "shuttlecock_draws.csv") -> Recurrenc
     _camera(m, noise)
     add_filter(m, joint_model(m), section="Kalman")
     add_regressors(m, "Fit raw")
-    add_fit(m, "Fit raw", "raw", FORECASTS["raw"], "obs")
     add_theory(m, "Fit raw")
+    add_fit(m, "Fit raw", "raw", FORECASTS["raw"], "obs")
     add_fit(m, "Fit filtered", "kf", FORECASTS["kf"], "a")
     add_latest(m, "Latest state", "now", FORECASTS["now"])
     add_filter(m, exact_model(m), section="Exact filter", suffix="_ex")
@@ -210,18 +210,18 @@ CHARTS = (
         (
             Series("time", "vz_true", "truth", "truth"),
             Series("time", "vz_a", "filter", "line"),
-            Series("time", "vz_a_ex", "exact filter", "second line"),
+            Series("time", "vz_a_ex", "exact filter", "forecast"),
         ),
         note="Neither filter is told a velocity; both start at 0.",
     ),
     _error_chart(
         "The fall point, from fits",
-        {"raw": "first", "kf": "second"},
-        "Does filtering first help the fit? One flight does not tell; the notebook flies 400.",
+        {"raw": "second", "kf": "first"},
+        "Does filtering first help? The notebook flies 400 times. Theory: if the model is right.",
     ),
     _error_chart(
         "The fall point, from latest states",
-        {"raw": "first", "now": "free", "ex": "second line"},
+        {"raw": "second", "now": "free", "ex": "forecast"},
         "The exact filter soon is the fit, frame by frame; the three-state filter forgets.",
     ),
 )
