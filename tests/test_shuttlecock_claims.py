@@ -90,7 +90,7 @@ def after(errors, frames):
 
 
 def test_the_reference_is_reproduced_once_frames_are_counted_as_it_counts_them():
-    """Consistent with: after 6 frames are the frames 0 to 5; its filter uses the first one twice."""
+    """Consistent with: after 6 frames are the frames 0 to 5; its filter counts the first twice."""
     flights = fly(reference_draws, f_start=0.5)
     for kind, medians in REFERENCE.items():
         np.testing.assert_allclose(after(flights[kind], AFTER - 1), medians, atol=ROUNDED)
