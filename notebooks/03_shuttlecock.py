@@ -537,14 +537,14 @@ print(f"filtering first changes the error by {cost.mean():+.1%} ± {1.96 * cost.
 # drag and one with three times as much, each filtered and fitted with its own:
 
 # %%
-others = {0.3: fly(k_m=0.3), 1: flights, 3: fly(k_m=3)}
+drags = {0.3: fly(k_m=0.3), 1: flights, 3: fly(k_m=3)}
 rows = {}
-for k_m, f in others.items():
+for k_m, f in drags.items():
     found = ratio(f["e_fall_kf"], f["e_fall_raw"]).T
     rows[k_m] = [f"{mid:.2f} ({low:.2f} to {high:.2f})" for mid, low, high in found]
     each = np.log(f["e_fall_kf"][:, 6:] / f["e_fall_raw"][:, 6:]).mean(axis=1)
-    print(f"k/m = {k_m}/s: {each.mean():+.1%} ± {1.96 * each.std() / 20:.1%}")
-pd.DataFrame(rows, index=pd.Index(AFTER, name="frame")).rename_axis(columns="k/m (1/s)")
+    rows[k_m].append(f"{each.mean():+.1%} ± {1.96 * each.std() / 20:.1%}")
+pd.DataFrame(rows, index=[*AFTER, "6 to 26"]).rename_axis(columns="k/m (1/s)")
 
 # %% [markdown]
 # The verdict is the same: no band lies below 1, and over all frames filtering first costs two or
