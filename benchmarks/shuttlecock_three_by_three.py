@@ -11,6 +11,8 @@ last is kept in ``shuttlecock_three_by_three.txt`` beside it.
 
 from __future__ import annotations
 
+import os
+import platform
 import timeit
 from collections.abc import Callable
 from importlib.util import find_spec
@@ -214,7 +216,10 @@ def main() -> None:
     """Print both tables."""
     print("Arithmetic operations of one step, matrices without zeros (SymPy)\n")
     print(counted().to_string())
-    print(f"\nTime of one step (NumPy {np.__version__}, best of {REPEATS} times {STEPS})\n")
+    machine = f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}"
+    print(
+        f"\nTime of one step (NumPy {np.__version__}, best of {REPEATS} times {STEPS}; {machine})\n"
+    )
     print(timed().map("{:.1f} us".format).to_string())
     positions = np.random.RandomState(1).standard_normal((27, 3))
     print(f"\nLargest difference of the results in 27 frames: {disagreement(positions):.0e}")

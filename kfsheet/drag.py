@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from sympy import Expr, Matrix, Symbol, exp, symbols
+from sympy import Expr, Matrix, Symbol, exp, log, sqrt, symbols
 
 from kfsheet.algebra import transition_matrix_laplace
 from kfsheet.errors import ModelError
@@ -107,11 +107,37 @@ def fall_argument(k: Expr, g: Expr, v: Expr, c: Expr) -> Expr:
     return -(1 + k * v / g) * exp(-c)
 
 
+def lambert_start(reach: Expr) -> Expr:
+    """A first guess of W(w) from reach = 1 + e w: log(1 + sqrt(2 reach) + reach/3) - 1.
+
+    Around w = -1/e, where the branches of W meet, W = -1 + p - p^2/3 + ... with
+    p = sqrt(2 reach), and Newton's method from elsewhere halves its error a step at best. Weak drag
+    leads there: p is about k times the time of flight. The guess has the same first three terms,
+    and grows like a logarithm, as W does. It is at most 0.011 off for w < 0, 0.37 for w < 100.
+
+    Parameters
+    ----------
+    reach : Expr
+        1 + e w, at least 0.
+
+    Examples
+    --------
+    >>> from sympy import Symbol, series
+    >>> p = Symbol("p", positive=True)
+    >>> series(lambert_start(p**2 / 2), p, n=3)
+    -1 + p - p**2/3 + O(p**3)
+    """
+    return log(1 + sqrt(2 * reach) + reach / 3) - 1
+
+
 def lambert_step(W: Expr, w: Expr) -> Expr:
     """A step of Newton's method towards W(w): that for the height of the flight, in other units.
 
-    From W = 0, which is the moment c/k, the steps run to the principal branch without
-    overshooting, for every w > -1/e.
+    From :func:`lambert_start`, three steps give all digits that 1 + e w has for w < 0, and four for
+    w < 100. Larger ones belong to flights that begin by falling at several times the terminal
+    velocity. The 1e-16 to which 1 + e w is known leave the fall time uncertain by some 1e-15/k^2
+    seconds (k in 1/s): 1e-9 s for k = 0.001/s. The flight itself, computed by the same numbers, is
+    no more certain.
 
     Examples
     --------

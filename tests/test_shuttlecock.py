@@ -16,6 +16,7 @@ from sympy import Matrix, Symbol, diff, series, symbols
 
 from kfsheet import ModelError, Recurrence, add_filter, evaluate, t
 from kfsheet.drag import distorted, flight
+from kfsheet.excel.recalculate import open_workbook
 from kfsheet.exercises.shuttlecock import DATA, build_model, shuttlecock
 from kfsheet.shuttlecock.filters import joint_model
 from kfsheet.shuttlecock.forecasts import add_fit, add_latest, track_fit
@@ -313,7 +314,7 @@ def test_without_noise_every_fit_is_the_truth():
 
 
 @pytest.mark.parametrize(
-    "parameters", [{}, {"k_m": 0.2}, {"e_k": 1}, {"z_fall": -2}, {"k_2": 0.4}], ids=str
+    "parameters", [{}, {"k_m": 0.2}, {"f_k": 2}, {"z_fall": -2}, {"k_2": 0.4}], ids=str
 )
 def test_newton_in_cells_finds_the_fall_that_a_bracketing_root_finder_finds(parameters):
     f = evaluate(shuttlecock, **parameters)
@@ -390,3 +391,12 @@ def test_the_sums_of_the_fit_are_those_of_the_normal_equations():
     at = dict(zip(sums.values(), (4, X.sum(), X @ X, y.sum(), X @ y), strict=True))
     found = [float(solution[letter].subs(at)) for letter in "pv"]
     np.testing.assert_allclose(found, np.linalg.lstsq(np.vander(X, 2)[:, ::-1], y)[0])
+
+
+def test_a_wide_sheet_prints_on_several_pages_each_with_frame_and_time():
+    """On one page, 72 columns would be some 4 mm wide each."""
+    book = open_workbook(Path(__file__).parents[1] / "workbooks" / "shuttlecock.xlsx")
+    wide, narrow = book["Kalman"], book["Camera"]
+    assert wide.max_column / wide.page_setup.fitToWidth <= 16
+    assert wide.print_title_cols == "$A:$B"
+    assert narrow.page_setup.fitToWidth in (None, 1)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from io import BytesIO
+from math import ceil
 from pathlib import Path
 
 from openpyxl import Workbook
 from openpyxl.formatting.rule import CellIsRule, FormulaRule
 from openpyxl.packaging.custom import StringProperty
 from openpyxl.styles import Font, PatternFill
-from openpyxl.utils import get_column_letter, quote_sheetname
+from openpyxl.utils import column_index_from_string, get_column_letter, quote_sheetname
+from openpyxl.utils.cell import coordinate_from_string
 from openpyxl.workbook.defined_name import DefinedName
 from openpyxl.worksheet.datavalidation import DataValidation
 from openpyxl.worksheet.worksheet import Worksheet
@@ -33,6 +35,7 @@ from kfsheet.exercise import Exercise
 from kfsheet.files import write_file
 
 TABS = {"Read me": "1F3864", "Parameters": "FFC000", "Charts": "0072B2", "Check": "70AD47"}
+COLUMNS_IN_VIEW, COLUMNS_ON_PAPER = 20, 16  # a wider table is unreadable on one page
 
 
 def compose(exercise: Exercise, layout: Layout, now: Run, built: Run) -> list[Page]:
@@ -155,6 +158,17 @@ def _dress(sheet: Worksheet, page: Page) -> None:
     sheet.sheet_properties.pageSetUpPr.fitToPage = True
     if page.freeze:
         sheet.print_title_rows = f"1:{FIRST_ROW - 1}"
+        _spread(sheet, page)
+
+
+def _spread(sheet: Worksheet, page: Page) -> None:
+    """A wide table on several pages side by side, each with the columns that stay in view."""
+    if page.width <= COLUMNS_IN_VIEW:
+        return
+    sheet.page_setup.fitToWidth = ceil(page.width / COLUMNS_ON_PAPER)
+    last = coordinate_from_string(page.freeze)[0]
+    if last != "A":
+        sheet.print_title_cols = f"A:{get_column_letter(column_index_from_string(last) - 1)}"
 
 
 def _define_names(book: Workbook, layout: Layout, pages: list[Page]) -> None:

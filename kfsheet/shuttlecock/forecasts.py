@@ -9,15 +9,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-from sympy import Expr, Matrix, Max, Piecewise, Symbol, exp, sqrt, symbols
+from sympy import Expr, Matrix, Piecewise, Symbol, exp, log, sqrt, symbols
 
-from kfsheet.drag import distorted, fall_argument, fall_asymptote, flight, lambert_step
+from kfsheet.drag import (
+    distorted,
+    fall_argument,
+    fall_asymptote,
+    flight,
+    lambert_start,
+    lambert_step,
+)
 from kfsheet.expressions import Last, Missing, t, when_observed
 from kfsheet.fitting import least_squares
 from kfsheet.recurrence import Recurrence
 from kfsheet.shuttlecock.filters import AXES, WAYS
 
-NEWTON_STEPS = 8  # enough for weak drag; with the source's numbers five are
+NEWTON_STEPS = 4  # three for every flight that is slower than the terminal velocity
 
 
 def add_landing(
@@ -50,9 +57,14 @@ def add_landing(
     certain : bool
         Whether there always is an end: where the flight stays below ``z_fall``, its highest point.
         By default such a flight has none.
+
+    Notes
+    -----
+    The time is right within some 1e-15/k^2 seconds (k in 1/s); see
+    :func:`kfsheet.drag.lambert_step`.
     """
-    steps = [f"W_{n}" for n in range(1, NEWTON_STEPS + 1)]
-    names = ["c", "w", *steps, "t_fall", "x_fall", "y_fall"]
+    steps = [f"W_{n}" for n in range(NEWTON_STEPS + 1)]
+    names = ["c", "w", "reach", *steps, "t_fall", "x_fall", "y_fall"]
     m.columns(*(f"{name}_{run}" for name in names), section=page)
 
     def put(name: str, rule: Expr, unit: str, what: str, read: str = "") -> Expr:
@@ -64,15 +76,19 @@ def add_landing(
 
     c = fall_asymptote(k, m["g"], p[2] - m["z_fall"], v[2])
     c = put("c", c, "", "when the asymptote of the flight ends, times k")
-    w, at_least = fall_argument(k, m["g"], v[2], c), -exp(-1)
-    w = put("w", Max(w, at_least) if certain else w, "", "argument of Lambert's W")
-    first = lambert_step(0, w)
-    if not certain:
-        first = Piecewise((first, w >= at_least), (Missing, True))
-    W = put("W_1", first, "", "W(w), first step of Newton's method")
+    w = put("w", fall_argument(k, m["g"], v[2], c), "", "argument of Lambert's W")
+    reach = put("reach", 1 + exp(1) * w, "", "1 + e w; below 0 the flight stays below")
+    first = Piecewise((lambert_start(reach), reach > 0), (-1 if certain else Missing, True))
+    W = put("W_0", first, "", "W(w), first guess")
     for before, name in pairwise(steps):
-        W = put(name, lambert_step(W, w), "", f"W(w), step {name[2:]}", before)
-    end = put("t_fall", since + (c + W) / k, "s", "time of the fall", steps[-1])
+        rule = lambert_step(W, w)
+        if certain:  # at -1, where both moments meet, a step would divide 0 by 0
+            rule = Piecewise((rule, reach > 0), (-1, True))
+        W = put(name, rule, "", f"W(w), step {name[2:]} of Newton's method", before)
+    after = (c + W) / k
+    if certain:
+        after = Piecewise((after, reach > 0), (log(1 + k * v[2] / m["g"]) / k, True))
+    end = put("t_fall", since + after, "s", "time of the fall", steps[-1])
     for n, axis in enumerate(("x", "y")):
         place = p[n] + v[n] * distorted(k, end - since)
         put(f"{axis}_fall", place, "m", f"fall point, {AXES[axis]}", "t_fall")
