@@ -107,7 +107,7 @@ def test_gaps_and_whole_columns_are_read_as_kfsheets_own_words(formula, expressi
         ('="a"&"b"', "'&'"),
         ('=A1="a"', "compares text"),
         ("=#REF!+1", "error #REF!"),
-        ("=A1+", "no formula"),
+        ("=A1+", "cannot be read"),
         ("=A1:C1", "range"),
         ("=A1:C1+1", "range"),
         ("=9^999^9", "beyond 1e308"),

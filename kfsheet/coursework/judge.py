@@ -131,7 +131,8 @@ class Judge:
         if content is None or content == "":
             return Cell(step, address, EMPTY)
         if not isinstance(content, Formula):
-            return Cell(step, address, TYPED)
+            words = "a text stands where a formula is asked for"
+            return Cell(step, address, TYPED, words=words if isinstance(content, str) else "")
         try:
             meaning = self._interpreter.meaning(address, step)
         except ForbiddenError as error:

@@ -27,7 +27,10 @@ def read_overrides(path: Path, exercise: Exercise, ids: set[str]) -> list[dict[s
     if not path.exists():
         write_file(path, HEAD.encode())
         return []
-    text = path.read_text(encoding="utf-8-sig")
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise DataError(f"{path} is not UTF-8; save it as CSV UTF-8") from None
     delimiter = ";" if text.partition("\n")[0].count(";") > 0 else ","
     lines = list(csv.DictReader(text.splitlines(), delimiter=delimiter))
     return [_checked(line, f"{path}, line {n}", exercise, ids) for n, line in enumerate(lines, 2)]

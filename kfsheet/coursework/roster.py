@@ -55,7 +55,7 @@ def _student(line: dict[str, str | None], where: str) -> Student:
     values = {key: (line.get(key) or "").strip() for key in ("id", "name", "email")}
     if not ID.fullmatch(values["id"]) or ".." in values["id"]:
         raise DataError(
-            f"{where}: the id {values['id']!r} must be letters, digits, dots, dashes: "
+            f"{where}: the id {values['id']!r} must be letters, digits, or one of . - _ @: "
             "it names a folder"
         )
     return Student(**values)

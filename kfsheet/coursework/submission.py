@@ -139,6 +139,9 @@ def _check_parts(archive: zipfile.ZipFile) -> None:
             raise SubmissionError("refused", "the file holds macros; save it as .xlsx")
     if sum(item.file_size for item in items) > LARGEST_TOTAL:
         raise SubmissionError("too large", "the file unpacks to more than the limit")
+    if "content.xml" in names and "mimetype" in names:
+        words = "this is an OpenDocument file; save it as .xlsx, Excel's format"
+        raise SubmissionError("wrong kind", words)
     if "xl/workbook.xml" not in names:
         raise SubmissionError("wrong kind", "the file is a zip, but no Excel workbook")
 

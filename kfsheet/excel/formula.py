@@ -7,6 +7,7 @@ formualizer parses the text with Excel's own precedence: unary minus binds *tigh
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -42,7 +43,9 @@ def parse_formula(text: str) -> Tree:
     try:
         node = formualizer.parse(text if text.startswith("=") else f"={text}")
     except Exception as error:  # formualizer raises its own kinds, and PanicException from Rust
-        raise FormulaError(f"this is no formula: {error}".splitlines()[0]) from None
+        place = re.search(r"position (\d+)", str(error))
+        where = f" near its character {int(place[1]) + 1}" if place else ""
+        raise FormulaError(f"the formula cannot be read{where}") from None
     return _tree(node.to_dict(), 0)
 
 
