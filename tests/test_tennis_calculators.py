@@ -46,7 +46,7 @@ def test_the_centroid_sheet_is_the_library(light):
     ],
 )
 def test_a_ball_that_the_rows_do_not_hold_is_noticed(values, fits):
-    """Against the library's centroid of the same ball on a large image of points."""
+    """Against the centre of intensity of the same ball on an image that is large enough."""
     p = {"window": 10, "i_ball": 4.5, "j_ball": 4.5, "pitch": 1.0} | values
     j, i = np.mgrid[-20:40, -20:40] * p["pitch"]
     a, b = (i - p["i_ball"]) / 4, (j - p["j_ball"]) / 4
