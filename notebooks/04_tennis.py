@@ -343,8 +343,8 @@ apart(0.0)
 
 # %% [markdown]
 # In kg/m and m/s². One throw knows drag to a tenth, and spin hardly at all: it scatters by as much
-# as itself, or twice. But there is more: drag, and the parts 1 and 3 of the spin, are off by four
-# errors of the mean or more, and off without noise too. The quadratic has one acceleration, which
+# as itself, or twice. But there is more: parts 1 and 3 of the spin are off by four errors of the
+# mean, drag by more, and all are off without noise too. The quadratic has one acceleration, which
 # belongs to the *middle* of the overlap, but is taken apart along $V$ at $t = 0$: drag leaks
 # across. And if time is counted from the middle?
 

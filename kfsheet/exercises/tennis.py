@@ -189,18 +189,15 @@ ABOUT = (
     "the side has it in images 5 to 12 only. Each pixel errs by 0.2 px. Where is the ball in the "
     "other images, and where will it come down?",
     "Triangulation needs both cameras. The filter (sheet Kalman filter) takes every pixel by "
-    "itself, up to four in an image, and carries position and velocity by the equation of the "
-    "flight with drag and spin. The sheet Flight goes on from its last analysis to the ground.",
+    "itself, and carries position and velocity by the equation of the flight with drag and spin. "
+    "The sheet Flight goes on to the ground; if h_fly is too short for it, landed is 0 and red.",
     "The filter starts from a parabola through the triangulated points, so the pixels of images 5 "
-    "to 12 count twice: in the start, and when their turn comes. But the start claims s_x and s_v "
-    "as its errors, some fifty times its own, and so has little weight. In its first row the "
-    "filter takes no photo: the two pixels of image 0 are not used.",
+    "to 12 count twice. But the start claims s_x and s_v as its errors, some fifty times its own, "
+    "and so has little weight. In its first row the filter takes no photo.",
     "Try this: on the sheet Parameters, set kappa to 0.0186 (drag measured 10 % too low): the "
     "innovations of camera 1 leave their band, mean_NIS rises, and the impact moves. Or delete the "
     "photos of camera 2 from image 7 on, and see what the depth x1 then is worth. Or empty all "
     "photos from image 30 on: the sheet then foretells the impact from the first 30 images.",
-    "landed, the last result of the flight, is 1 if the last row lies on the ground. If h_fly is "
-    "too short, the rows end in the air: landed is 0 and red, and the impact is none.",
     "The sheets Cameras and Centroid are calculators: where to put two cameras, and what light "
     "from the side does to the centre of intensity of a ball eight pixels wide (phi, ambient, "
     "albedo, wall, threshold). Geometry, noise and ball are ours: the source prints none.",
