@@ -8,9 +8,18 @@ from scipy.optimize import minimize
 
 from kfsheet.errors import DataError
 from kfsheet.exercises.tennis import read_drive, read_toss
+from kfsheet.tennis.closed_form import closed_form
 from kfsheet.tennis.cones import Cones, project_on_both
-from kfsheet.tennis.dynamics import TEXTBOOK_DRAG
-from kfsheet.tennis.loop import first_estimate, into_cones, iterate, modes, weights
+from kfsheet.tennis.dynamics import TEXTBOOK_DRAG, Ball
+from kfsheet.tennis.loop import (
+    first_estimate,
+    fit_closed_form,
+    into_cones,
+    iterate,
+    modes,
+    slowest_mode,
+    weights,
+)
 from kfsheet.tennis.shots import DRIVE, simulate
 
 SHOTS = {"A": read_drive(), "B": read_toss()}
@@ -183,6 +192,62 @@ def test_the_slowest_mode_needs_a_quarter_of_a_million_turns(loops):
     left = modes(SHOTS["A"], loops["A"].turns[20].ball)
     assert 1 - left[0] == pytest.approx(4e-6, rel=0.2)
     assert 1 - left[1] > 1000 * (1 - left[0])
+
+
+@pytest.mark.parametrize("name", SHOTS)
+def test_a_known_g_does_not_help_the_depth(name):
+    """The control: without its freedom of scale the loop keeps the first error all the same."""
+    shot = SHOTS[name]
+    known = iterate(shot, limit=100, fit_g=False)
+    assert {turn.ball.g for turn in known.turns} == {9.8}
+    assert shot.rms(known.last.x)[0] > 0.99 * shot.rms(known.turns[1].x)[0]
+    assert known.last.ball.c_D == pytest.approx(TEXTBOOK_DRAG, rel=0.05)
+    left = modes(shot, known.last.ball, fit_g=False)
+    assert left.shape == (10,)
+    assert 0 < 1 - left[0] < 2e-5
+
+
+@pytest.mark.parametrize("fit_g", [True, False])
+@pytest.mark.parametrize("name", SHOTS)
+def test_the_slowest_mode_is_what_a_turn_of_the_loop_leaves(name, fit_g):
+    """One real turn, projection and fit, from a flight moved by a millimetre along the mode."""
+    shot = SHOTS[name]
+    ball = iterate(shot, fit_g=fit_g).last.ball
+    mode = 1e-3 * slowest_mode(shot, ball, fit_g=fit_g)
+    rays = Cones.of(shot.scene.camera_1, shot.pixels_1, 1e-9)
+
+    def turn(x):
+        believed = rays.project(x)
+        believed[shot.overlap] = shot.triangulated()[shot.overlap]
+        w = weights(shot, shot.scene.ball.fly(shot.times))
+        found = fit_closed_form(shot.times, believed, w, ball, fit_g=fit_g)
+        at = found.X, found.V, found.kappa, found.spin, found.g
+        return closed_form(shot.times, *at)
+
+    x = closed_form(shot.times, ball.X, ball.V, ball.kappa, ball.spin, ball.g)
+    np.testing.assert_allclose(turn(x + mode) - turn(x), mode, atol=2e-6)
+
+
+@pytest.mark.parametrize("name", SHOTS)
+def test_the_slowest_mode_hides_from_both_cameras(name):
+    """It keeps to a thousandth where camera 2 looks; and what camera 1 sees of a metre is small."""
+    shot, camera = SHOTS[name], SHOTS[name].scene.camera_1
+    mode = slowest_mode(shot, iterate(shot).last.ball)
+    assert np.abs(mode[shot.overlap]).max() < 5e-3
+    seen = camera.project(shot.truth + 1e-3 * mode) - camera.project(shot.truth)
+    assert 1e3 * np.sqrt(np.mean(seen**2)) < 0.4
+
+
+def test_a_known_g_stays_and_the_rest_is_fitted():
+    """Points of (3.5) itself: the fit finds them again, from another start with the right g."""
+    ball = Ball((5.5, 5.6, 1.2), (28, 1, 6), 0.02, (0.02, 0.05, 0.04), 9.5)
+    times = SHOTS["A"].times
+    x = closed_form(times, ball.X, ball.V, ball.kappa, ball.spin, ball.g)
+    start = Ball((5.4, 5.7, 1.3), (27, 1.2, 5), 0.018, (0, 0, 0), 9.5)
+    found = fit_closed_form(times, x, np.full(101, 1 / 101), start, fit_g=False)
+    assert found.g == 9.5
+    np.testing.assert_allclose(found.V, ball.V, rtol=1e-6)
+    assert found.kappa == pytest.approx(ball.kappa, rel=1e-6)
 
 
 def test_the_loop_stops_for_each_of_its_reasons():

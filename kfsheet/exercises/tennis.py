@@ -97,6 +97,9 @@ def _parameters(m: Recurrence, scene: Scene) -> None:
     m.parameter("n_round", 100, "", rounded, sign="positive")
     m.parameter("Phi_s", 0, "m2/s3", "noise of the model, spectral density", sign="nonnegative")
     m.parameter("h_fly", 0.01, "s", "longest step of the flight to the ground", sign="positive")
+    m.parameter("h_ground", 1e-6, "m", "height that counts as on the ground", sign="positive")
+    shown = "largest innovation sigma that charts show as a band, in sigma_px"
+    m.parameter("n_band", 3.5, "", shown, sign="positive")
     m.time(t * dt, "s", "time since the first image")
 
 
@@ -162,7 +165,7 @@ def _errors(m: Recurrence, shot: Shot) -> None:
         variance = m["S_u1" if name == "u1" else f"S_{name}_f"][t]
         low, high = m.columns(f"d_{name}_low", f"d_{name}_high", section=page)
         # The band of the start, hundreds of pixels wide, would make the chart of the rest a line.
-        settled = variance < 12 * m["sigma_px"] ** 2
+        settled = variance < (m["n_band"] * m["sigma_px"]) ** 2
         band = Piecewise(
             (2 * sqrt(variance), Observed(m[f"d_{name}"][t]) & settled), (Missing, True)
         )
@@ -186,15 +189,15 @@ ABOUT = (
     "the side has it in images 5 to 12 only. Each pixel errs by 0.2 px. Where is the ball in the "
     "other images, and where will it come down?",
     "Triangulation needs both cameras. The filter (sheet Kalman filter) takes every pixel by "
-    "itself, up to four in an image, and carries position and velocity by the equation of the "
-    "flight with drag and spin. The sheet Flight goes on from its last analysis to the ground.",
+    "itself, and carries position and velocity by the equation of the flight with drag and spin. "
+    "The sheet Flight goes on to the ground; if h_fly is too short for it, landed is 0 and red.",
     "The filter starts from a parabola through the triangulated points, so the pixels of images 5 "
-    "to 12 count twice: in the start, and when their turn comes. But the start claims s_x and s_v "
-    "as its errors, some fifty times its own, and so has little weight. In its first row the "
-    "filter takes no photo: the two pixels of image 0 are not used.",
+    "to 12 count twice. But the start claims s_x and s_v as its errors, some fifty times its own, "
+    "and so has little weight. In its first row the filter takes no photo.",
     "Try this: on the sheet Parameters, set kappa to 0.0186 (drag measured 10 % too low): the "
     "innovations of camera 1 leave their band, mean_NIS rises, and the impact moves. Or delete the "
-    "photos of camera 2 from image 7 on, and see what the depth x1 then is worth.",
+    "photos of camera 2 from image 7 on, and see what the depth x1 then is worth. Or empty all "
+    "photos from image 30 on: the sheet then foretells the impact from the first 30 images.",
     "The sheets Cameras and Centroid are calculators: where to put two cameras, and what light "
     "from the side does to the centre of intensity of a ball eight pixels wide (phi, ambient, "
     "albedo, wall, threshold). Geometry, noise and ball are ours: the source prints none.",
@@ -246,6 +249,7 @@ def exercise_of(model: Recurrence, shot: Shot) -> Exercise:
         questions=QUESTIONS,
         notebook="notebooks/04_tennis.ipynb",
         sections=SECTIONS,
+        alarm="landed",
         vary={"sigma_px": (0.15, 0.3), "s_x": (0.08, 0.15), "s_v": (0.8, 1.5)},
         draw=photographed_again,
     )

@@ -26,8 +26,18 @@ def _innovations(name: str, role: str, note: str) -> Chart:
 
 
 CHARTS = (
-    _path("Side view", 3, "x3: height (m)", "The flight from the side, and on to the ground."),
-    _path("Top view", 2, "x2: away from camera 2 (m)", "From above; x2 is stretched."),
+    _path(
+        "Side view",
+        3,
+        "x3: height (m)",
+        "From the side, and on to the ground; the truth lies under the filter.",
+    ),
+    _path(
+        "Top view",
+        2,
+        "x2: away from camera 2 (m)",
+        "From above, x2 stretched; the truth lies under the filter: see the errors.",
+    ),
     Chart(
         "What the cameras see",
         "u: to the right (px)",
@@ -46,18 +56,22 @@ CHARTS = (
         ),
         note="What both cameras knew early, the equation of the flight carries on.",
     ),
-    _innovations("u1", "first", "An honest filter: 19 of 20 inside the band."),
+    _innovations(
+        "u1",
+        "first",
+        "An honest filter: 19 of 20 inside. At first the band is too wide to show (n_band).",
+    ),
     _innovations("v1", "second", "The same for the vertical pixel."),
     _innovations("u2", "first", "Camera 2: eight images."),
     _innovations("v2", "second", "The same for its vertical pixel."),
     Chart(
         "Where to put the cameras",
-        "theta (rad)",
-        "m",
+        "theta (deg)",
+        "error (m)",
         (
-            Series("theta", "H", "H, along", "line"),
-            Series("theta", "V", "V, across", "second line"),
-            Series("theta", "rms_cross", "rms", "free"),
+            Series("theta_deg", "H", "H, along", "line"),
+            Series("theta_deg", "V", "V, across", "second line"),
+            Series("theta_deg", "rms_cross", "rms", "free"),
         ),
         note="Diagonals of the error diamond, and the rms error: their minima differ.",
     ),

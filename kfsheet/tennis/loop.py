@@ -117,14 +117,19 @@ def first_estimate(shot: Shot, g: float = GRAVITY) -> Ball:
     return Ball(found.x[:3], found.x[3:], kappa, np.zeros(3), g)
 
 
-def _vector(ball: Ball) -> Array:
-    return np.concatenate([ball.X, ball.V, ball.spin, [ball.kappa, ball.g]]) / SCALE
+def _vector(ball: Ball, fit_g: bool) -> Array:
+    vector = np.concatenate([ball.X, ball.V, ball.spin, [ball.kappa, ball.g]]) / SCALE
+    return vector if fit_g else vector[:-1]
 
 
-def _positions(times: Array, vectors: Array) -> Array:
-    """(3.5) for vectors (..., 11) of scaled parameters: (..., 3n), image by image."""
-    p = vectors * SCALE
-    x = closed_form(times, p[..., :3], p[..., 3:6], p[..., 9], p[..., 6:9], p[..., 10])
+def _positions(times: Array, vectors: Array, known_g: float) -> Array:
+    """(3.5) for vectors of scaled parameters: (..., 3n), image by image.
+
+    Vectors (..., 11) end with g; vectors (..., 10) leave it out, and ``known_g`` holds.
+    """
+    p = vectors * SCALE[: vectors.shape[-1]]
+    g = p[..., 10] if p.shape[-1] == len(SCALE) else known_g
+    x = closed_form(times, p[..., :3], p[..., 3:6], p[..., 9], p[..., 6:9], g)
     return x.reshape(*p.shape[:-1], -1)
 
 
@@ -135,7 +140,7 @@ def _derivative(function: Callable[[Array], Array], p: Array) -> Array:
     return (ahead - behind).T / (2 * STEP)
 
 
-def fit_closed_form(times: Array, x: Array, w: Array, start: Ball) -> Ball:
+def fit_closed_form(times: Array, x: Array, w: Array, start: Ball, *, fit_g: bool = True) -> Ball:
     """Weighted least squares of (3.5) in eleven parameters: X, V, lambda, c_D/m and g.
 
     Parameters
@@ -144,18 +149,21 @@ def fit_closed_form(times: Array, x: Array, w: Array, start: Ball) -> Ball:
         (n,), (n, 3) and (n,): the sum of w |x - (3.5)|^2 is made least.
     start : Ball
         Where to begin.
+    fit_g : bool
+        Whether g is free; otherwise it stays that of ``start``.
     """
     root = np.repeat(np.sqrt(w), 3)
 
     def residuals(p: Array) -> Array:
-        return (_positions(times, p) - x.ravel()) * root
+        return (_positions(times, p, start.g) - x.ravel()) * root
 
     def jacobian(p: Array) -> Array:
-        return _derivative(lambda many: _positions(times, many), p) * root[:, None]
+        return _derivative(lambda many: _positions(times, many, start.g), p) * root[:, None]
 
-    p = _vector(start)
-    p = least_squares(residuals, p, jacobian, method="lm", xtol=1e-12, ftol=1e-12).x * SCALE
-    return Ball(p[:3], p[3:6], p[9], p[6:9], p[10])
+    p = _vector(start, fit_g)
+    p = least_squares(residuals, p, jacobian, method="lm", xtol=1e-12, ftol=1e-12).x
+    p = p * SCALE[: len(p)]
+    return Ball(p[:3], p[3:6], p[9], p[6:9], p[10] if fit_g else start.g)
 
 
 def iterate(
@@ -163,6 +171,7 @@ def iterate(
     *,
     radius: float = 0.6,
     g: float = GRAVITY,
+    fit_g: bool = True,
     limit: int = 20,
     g_tolerance: float = 0.0,
     stable: float = 0.0,
@@ -177,6 +186,8 @@ def iterate(
         Of the error cones, px.
     g : float
         Gravity of the first estimate, m/s2; afterwards it is fitted.
+    fit_g : bool
+        False keeps ``g`` as it is, in all turns: the report's loop without its freedom of scale.
     limit : int
         Largest number of turns.
     g_tolerance : float
@@ -196,7 +207,7 @@ def iterate(
     for n in range(limit + 1):
         if turns:
             believed = turns[-1].pseudo
-            ball = fit_closed_form(shot.times, believed, weights(shot, believed), ball)
+            ball = fit_closed_form(shot.times, believed, weights(shot, believed), ball, fit_g=fit_g)
         x = closed_form(shot.times, ball.X, ball.V, ball.kappa, ball.spin, ball.g)
         moved = np.sqrt(np.mean((x - turns[-1].x) ** 2)) if turns else np.inf
         turns.append(Iteration(n, ball, x, into_cones(shot, x, radius), float(moved)))
@@ -209,8 +220,8 @@ def iterate(
     return Loop(turns, reason)
 
 
-def modes(shot: Shot, ball: Ball) -> Array:
-    """What is left, after one turn, of a small change of the eleven parameters: the eigenvalues.
+def modes(shot: Shot, ball: Ball, *, fit_g: bool = True) -> Array:
+    """What is left, after one turn, of a small change of the parameters: the eigenvalues.
 
     A fit of pseudo-positions y to (3.5) with the Jacobian J turns a change dy into
     dp = (J'WJ)^-1 J'W dy, and a change dp moves the pseudo-positions by D dp. Cones as thin as
@@ -222,26 +233,48 @@ def modes(shot: Shot, ball: Ball) -> Array:
         The photos.
     ball : Ball
         Where the loop has settled.
+    fit_g : bool
+        Whether g is free, as for :func:`fit_closed_form`.
 
     Returns
     -------
     ndarray
-        (11,) moduli of the eigenvalues of (J'WJ)^-1 J'W D, the largest first; the loop forgets a
-        mode the faster, the smaller it is, and one of 1 never.
+        (11,) moduli, or (10,) without g, of the eigenvalues of (J'WJ)^-1 J'W D, the largest first;
+        the loop forgets a mode the faster, the smaller it is, and one of 1 never.
     """
+    values = np.linalg.eigvals(_turn(shot, ball, fit_g)[1])
+    return np.sort(np.abs(values))[::-1]
+
+
+def slowest_mode(shot: Shot, ball: Ball, *, fit_g: bool = True) -> Array:
+    """How the flight moves in the mode that the loop forgets last; arguments as for :func:`modes`.
+
+    Returns
+    -------
+    ndarray
+        (images, 3) of movements, where the last x1 moves by 1.
+    """
+    J, turn = _turn(shot, ball, fit_g)
+    values, vectors = np.linalg.eig(turn)
+    path = (J @ vectors[:, np.argmax(np.abs(values))].real).reshape(-1, 3)
+    return path / path[-1, 0]
+
+
+def _turn(shot: Shot, ball: Ball, fit_g: bool) -> tuple[Array, Array]:
+    """The Jacobian J of (3.5) in the scaled parameters, and what a turn makes of a change."""
     rays = Cones.of(shot.scene.camera_1, shot.pixels_1, THIN)
     both, seen = shot.overlap, shot.triangulated()
 
+    def positions(vectors: Array) -> Array:
+        return _positions(shot.times, vectors, ball.g)
+
     def believed(vectors: Array) -> Array:
-        x = _positions(shot.times, vectors).reshape(len(vectors), -1, 3)
+        x = positions(vectors).reshape(len(vectors), -1, 3)
         moved = np.stack([rays.project(one) for one in x])
         moved[:, both] = seen[both]
         return moved.reshape(len(x), -1)
 
-    p = _vector(ball)
-    x = _positions(shot.times, p).reshape(-1, 3)
-    root = np.repeat(np.sqrt(weights(shot, x)), 3)[:, None]
-    J = _derivative(lambda many: _positions(shot.times, many), p) * root
-    D = _derivative(believed, p) * root
-    values = np.linalg.eigvals(np.linalg.lstsq(J, D, rcond=None)[0])
-    return np.sort(np.abs(values))[::-1]
+    p = _vector(ball, fit_g)
+    root = np.repeat(np.sqrt(weights(shot, positions(p).reshape(-1, 3))), 3)[:, None]
+    J, D = _derivative(positions, p), _derivative(believed, p)
+    return J, np.linalg.lstsq(J * root, D * root, rcond=None)[0]

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from sympy import Abs, Max, Mod, Piecewise, asin, cos, floor, pi, sin, sqrt
+from sympy import Abs, And, Max, Min, Mod, Piecewise, asin, cos, floor, pi, sin, sqrt
 
-from kfsheet.expressions import Smallest, Sum, SumProduct, t
+from kfsheet.expressions import Last, Smallest, Sum, SumProduct, t
 from kfsheet.recurrence import Recurrence
 from kfsheet.tennis.cameras import ANGLE, PIXELS
 
@@ -28,8 +28,10 @@ def add_cameras(m: Recurrence, section: str = "Cameras") -> None:
     m.derived("theta_best", best, "rad", "angle at which the longer diagonal is shortest")
     apex = pi - 2 * asin(1 / sqrt(3))
     m.derived("apex_best", apex, "rad", "angle between the lines of sight for the least rms")
-    theta, H, V, longer, rms = m.columns("theta", "H", "V", "longer", "rms_cross", section=section)
-    m.define(theta[t], (first + t * step) * pi / 180, "rad", "line of sight against base line")
+    names = ("theta_deg", "theta", "H", "V", "longer", "rms_cross")
+    degrees, theta, H, V, longer, rms = m.columns(*names, section=section)
+    m.define(degrees[t], first + t * step, "deg", "line of sight against base line")
+    m.define(theta[t], degrees[t] * pi / 180, "rad", "the same in rad")
     a = theta[t]
     m.define(H[t], 2 * half * sin(eps) / sin(2 * a - eps), "m", "diagonal along the base line")
     across = half * sin(eps) / (cos(a) * cos(a - eps))
@@ -51,7 +53,8 @@ def add_centroid(m: Recurrence, section: str = "Centroid") -> None:
     A row is a pixel of an image of 10 x 10; the last row is the first pixel of an eleventh line.
     """
     m.rows_are(section, "pixel")
-    side = m.parameter("window", WINDOW, "", "pixels along a side of the image", sign="positive")
+    words = "pixels along a side of the image; 10 fill the rows, see ball_fits"
+    side = m.parameter("window", WINDOW, "", words, sign="positive")
     i_0 = m.parameter("i_ball", 4.5, "px", "true centre of the ball, to the right")
     j_0 = m.parameter("j_ball", 4.5, "px", "true centre of the ball, down")
     R = m.parameter("radius_px", 4, "px", "radius of the ball in the image", sign="positive")
@@ -79,6 +82,11 @@ def add_centroid(m: Recurrence, section: str = "Centroid") -> None:
     difference = Abs(light[t] - wall)
     counted = Piecewise((difference, difference > least), (0, True))
     m.define(w[t], counted, "", "what is left of it after subtraction of the background")
+    # Pixels that would touch the ball, but have no row, begin at the sides of the image, and on
+    # the line of the last row, which is not complete.
+    inside = And(Min(i_0, j_0) - R >= -pitch, i_0 + R <= side * pitch, j_0 + R <= Last(j))
+    words = "1: the rows hold the whole ball; 0: a part is cut off, the shift is wrong"
+    m.summary("ball_fits", Piecewise((1, inside), (0, True)), "", words)
     for name, at, centre, words in (("i", i, i_0, "right"), ("j", j, j_0, "down")):
         found = m.summary(
             f"{name}_centroid", SumProduct(w, at) / Sum(w), "px", f"centre of intensity, {words}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sympy import Expr, Matrix, Min, S, floor, sqrt
+from sympy import Abs, Expr, Matrix, Min, Piecewise, S, floor, sqrt
 
 from kfsheet.expressions import RMS, Count, Last, Mean, Sum, SumProduct, t, when_observed
 from kfsheet.recurrence import Recurrence
@@ -155,6 +155,10 @@ def add_flight(m: Recurrence) -> None:
     )
     for k in AXES:
         m.summary(f"impact_x{k}", Last(x[k - 1]), "m", f"impact: x{k}")
+    # The steps close in on the ground; rounding leaves them a hair above or below it.
+    down = Abs(Last(x[2]) - m["r_ball"]) < m["h_ground"]
+    words = "1: the last row is on the ground; 0: in the air, no impact yet, make h_fly larger"
+    m.summary("landed", Piecewise((1, down), (0, True)), "", words)
 
 
 def _stages(
