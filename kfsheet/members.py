@@ -89,7 +89,7 @@ def study(
             raise DataError(f"{model.name} has no scalar {name}")
     kept = None if scalars is None else tuple(scalars)
     task = _first_task(model, members, data, names, kept, nees, parameters)
-    task = replace(task, keep=bool(quantiles))
+    task = replace(task, keep=len(quantiles) > 0)
     found = _computed(task, members, executor)
     return _study(model, members, [*names, *nees], task.kernel.scalars, found, quantiles)
 

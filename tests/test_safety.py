@@ -288,7 +288,7 @@ def test_2000_damaged_workbooks_crash_nothing(good, tmp_path, no_network):
         seen[found.status] = seen.get(found.status, 0) + 1
         assert found.status in STATUSES, found
     assert sum(seen.values()) == FUZZED
-    assert len(seen) >= 3, seen
+    assert {"graded", "damaged"} <= set(seen), seen
 
 
 def test_a_changed_formula_gets_full_marks_only_if_an_engine_agrees(good, tmp_path):

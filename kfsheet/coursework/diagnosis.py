@@ -6,8 +6,9 @@ import hashlib
 from collections.abc import Sequence
 from functools import lru_cache
 
-from sympy import Basic, Dummy, Indexed, Number
+from sympy import Basic, Indexed, Number
 
+from kfsheet.checks import walk
 from kfsheet.coursework.comparing import Question, question
 from kfsheet.coursework.mutations import MOST, mutations
 from kfsheet.coursework.worlds import Own, Scene
@@ -45,10 +46,8 @@ def judged_in(model: Recurrence, name: str, step: int, expression: Basic) -> lis
 def asks_for_its_row(model: Recurrence, expression: Basic) -> bool:
     """Whether an expression reads the number or the time of its row, not cells beside it only."""
     clock = model.clock and model.clock.base
-    cells = expression.atoms(Indexed)
-    if any(cell.base == clock for cell in cells):
-        return True
-    return expression.xreplace({cell: Dummy() for cell in cells}).has(t)
+    nodes = list(walk(expression))
+    return t in nodes or any(isinstance(node, Indexed) and node.base == clock for node in nodes)
 
 
 def digest_of(name: str, values: Sequence[str]) -> str:

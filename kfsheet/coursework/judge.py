@@ -6,13 +6,14 @@ that cannot be read as mathematics is handed to ``recalculated``, which asks a s
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
 from openpyxl.utils import get_column_letter
-from sympy import Basic, Indexed, Number, Symbol
+from sympy import Basic, Indexed
 
 from kfsheet.checks import columns_read
 from kfsheet.coursework.circles import find_circle
@@ -51,7 +52,7 @@ from kfsheet.recurrence import Recurrence
 
 CREDIT = {RIGHT: 1.0, HARD_CODED: 0.5, PARTLY: 0.5, GAPS: 0.5, ROUNDED: 0.5}
 """Share of the points by status; what is not listed gets none."""
-NUMBER = Symbol("a number")
+NUMBER = re.compile(r"(?<!\w)\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 FARTHEST = 8  # rows back; a key looks one or two rows back
 
 
@@ -299,7 +300,7 @@ def _numbers_in_disguise(rest: list[Cell]) -> bool:
     found = {c.expression for c in rest if c.expression is not None}
     if len(found) < 4 or 2 * len(found) <= len(rest):
         return False
-    shapes = Counter(e.xreplace(dict.fromkeys(e.atoms(Number), NUMBER)) for e in found)
+    shapes = Counter(NUMBER.sub("#", str(e)) for e in found)
     return 2 * shapes.most_common(1)[0][1] > len(found)
 
 
