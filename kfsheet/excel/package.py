@@ -19,6 +19,7 @@ from openpyxl.utils import column_index_from_string, coordinate_to_tuple, get_co
 from openpyxl.workbook.defined_name import DefinedName
 
 from kfsheet.errors import WorkbookError
+from kfsheet.excel.layout import Address
 
 Changes = dict[str, dict[tuple[int, int], float | None]]
 """Numbers to put into cells before calculating, by sheet and (row, column); None empties one."""
@@ -41,8 +42,6 @@ LINKS = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
 COMMENTS = re.compile(rb'<Relationship\b[^>]*/(?:comments|vmlDrawing)"[^>]*/>')
 DRAWING = re.compile(rb"<legacyDrawing\b[^>]*/>")
 WORKSHEET = re.compile(r"xl/worksheets/[^/]+\.xml")
-
-Address = tuple[str, int, int]
 
 
 @contextmanager
@@ -115,7 +114,8 @@ def strip_values(path: str | Path, copy: str | Path, changes: Changes | None = N
         If the file cannot be read or is no workbook.
     """
     with _refusing(path), zipfile.ZipFile(path) as old, zipfile.ZipFile(copy, "w") as new:
-        numbers = {_parts(old)[sheet]: cells for sheet, cells in (changes or {}).items()}
+        parts = _parts(old) if changes else {}
+        numbers = {parts[sheet]: cells for sheet, cells in (changes or {}).items()}
         for item in old.infolist():
             content = old.read(item)
             if WORKSHEET.fullmatch(item.filename):
