@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from functools import lru_cache
 from weakref import WeakKeyDictionary
 
-import mpmath
 from sympy import Basic
 
-from kfsheet.coursework.arithmetic import DIGITS, MISSING, NoValueError, Value, value_of
+from kfsheet.coursework import arithmetic
+from kfsheet.coursework.arithmetic import MISSING, NoValueError, Value, is_real, value_of
 from kfsheet.coursework.worlds import DEPTHS, NOBODY, Own, Scene, World
 
-TOLERANCE = mpmath.mpf(10) ** -12
-TINY = mpmath.mpf(10) ** -20
+TOLERANCE = 1e-12
+TINY = 1e-20
 ROUGH = 3e-3
 """How far a formula with a rounded constant may be off and still be called nearly right."""
 ENOUGH = 2
@@ -31,15 +31,13 @@ def worth(expression: Basic, world: World) -> Value | str:
 
 def difference(found: Value | str, wanted: Value | str) -> float | None:
     """Relative difference of two values; infinite if only one is a number, None if none is."""
-    numbers = [isinstance(v, mpmath.mpf) for v in (found, wanted)]
+    numbers = [is_real(v) for v in (found, wanted)]
     if not any(numbers):
         return 0.0 if found is wanted else float("inf") if wanted is MISSING else None
     if not all(numbers):
         return float("inf")
-    with mpmath.workdps(DIGITS):
-        far = abs(found - wanted)
-        size = max(abs(found), abs(wanted))
-        return 0.0 if far <= TINY else float(far / size)
+    far = arithmetic.size(arithmetic.difference(found, wanted))
+    return 0.0 if far <= TINY else float(far / max(abs(found), abs(wanted)))
 
 
 class Question:
@@ -91,7 +89,7 @@ class Question:
                 return False
             count += 1
         wanted = (self.wanted(world) for world in self.worlds(depth, own))
-        numbers = sum(isinstance(value, mpmath.mpf) for value in wanted)
+        numbers = sum(map(is_real, wanted))
         return count >= ENOUGH and numbers >= ENOUGH
 
     def nearly(self, expression: Basic) -> bool:
@@ -106,7 +104,7 @@ class Question:
         """Values at the points without gaps, to 10 figures: the same for the same function."""
         worlds = [w for w in self.worlds(DEPTHS[0]) if not w.gaps]
         found = (worth(expression, world) for world in worlds)
-        return tuple(mpmath.nstr(v, 10) if isinstance(v, mpmath.mpf) else str(v) for v in found)
+        return tuple(f"{float(v):.10g}" if is_real(v) else str(v) for v in found)
 
 
 @lru_cache(maxsize=4_096)

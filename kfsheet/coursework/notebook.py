@@ -12,10 +12,9 @@ from math import nan
 from pathlib import Path
 from typing import Any
 
-from mpmath import mpf
 from sympy import Basic, Dummy, Expr, Indexed, Symbol
 
-from kfsheet.coursework.arithmetic import MISSING
+from kfsheet.coursework.arithmetic import MISSING, cell_of
 from kfsheet.coursework.comparing import ERROR, worth
 from kfsheet.coursework.worlds import ALONE, Scene, World
 from kfsheet.errors import ModelError
@@ -139,7 +138,12 @@ def _tests(exercise: Exercise, name: str, key: Expr, names: dict[Basic, str]) ->
 
 
 def _at(world: World, node: Basic, row: int) -> Any:
-    return mpf(row) if node == t else world(node, row)
+    if node == t:
+        return row
+    if node.is_Symbol:
+        return world(node.name, 0)
+    name, fixed, place = cell_of(node)
+    return world(name, place if fixed else row - place)
 
 
 def _number(value: Any) -> str:

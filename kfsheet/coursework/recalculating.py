@@ -11,15 +11,12 @@ import time
 from functools import lru_cache
 from pathlib import Path
 
-import mpmath
-from sympy import Basic
-
-from kfsheet.coursework.arithmetic import MISSING, Value
+from kfsheet.coursework.arithmetic import MISSING, Value, exact, is_real
 from kfsheet.coursework.comparing import ERROR, difference, question, worth
 from kfsheet.coursework.engine import calculated
 from kfsheet.coursework.judge import asked_steps
 from kfsheet.coursework.places import Places
-from kfsheet.coursework.worlds import ALONE, Scene, World, cell_of
+from kfsheet.coursework.worlds import ALONE, Scene, World
 from kfsheet.errors import KfsheetError
 from kfsheet.excel.package import Changes
 from kfsheet.excel.recalculate import CellValue
@@ -59,13 +56,13 @@ class Recalculation:
                 live.row = step
                 wanted = worth(question(scene, name, step).key, live)
                 far = difference(live.found(step), wanted)
-                senseless = isinstance(wanted, mpmath.mpf) and abs(wanted) > HUGE
+                senseless = is_real(wanted) and abs(wanted) > HUGE
                 if far is None or (
                     world.wild and (ERROR in (live.found(step), wanted) or senseless)
                 ):
                     continue
                 good[step] &= far <= TOLERANCE
-                counts[step] += isinstance(wanted, mpmath.mpf)
+                counts[step] += is_real(wanted)
         return {step: good[step] and counts[step] >= FEWEST for step in steps}
 
 
@@ -86,11 +83,11 @@ def _changes(scene: Scene, places: Places, name: str, world: World) -> Changes:
 
     for other in (*model.parameters, *model.derived_scalars):
         if other != name:
-            put(places.address(other), world(model[other], 0))
+            put(places.address(other), world(other, 0))
     for column in model.table.values():
         if column.name != name:
             for step in range(model.rows):
-                put(places.address(column.name, step), world.cell(column.name, step))
+                put(places.address(column.name, step), world(column.name, step))
     return changes
 
 
@@ -103,16 +100,12 @@ class _Live:
         self._world, self._values, self._name = world, values, name
         self.row = 0
 
-    def __call__(self, node: Basic, row: int) -> Value:
-        if not node.is_Symbol:
-            name, fixed, place = cell_of(node)
-            if name == self._name:
-                return self.found(place if fixed else row - place)
-        return self._world(node, row)
+    def __call__(self, name: str, row: int) -> Value:
+        return self.found(row) if name == self._name else self._world(name, row)
 
     def found(self, step: int) -> Value | str:
         """What the engine found in a cell of the answer."""
         value = self._values.get(step)
         if isinstance(value, bool) or (isinstance(value, str) and value.startswith("#")):
             return ERROR
-        return mpmath.mpf(value) if isinstance(value, int | float) else MISSING
+        return exact(value) if isinstance(value, int | float) else MISSING

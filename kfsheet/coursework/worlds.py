@@ -17,13 +17,11 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import exp, isnan
 
-from mpmath import mpf
-from sympy import Basic, Indexed
+from sympy import Basic
 
 from kfsheet.checks import columns_read, scalars
-from kfsheet.coursework.arithmetic import MISSING, NoValueError, Value, value_of
+from kfsheet.coursework.arithmetic import MISSING, NoValueError, Value, exact, value_of
 from kfsheet.excel.compose import Run
-from kfsheet.expressions import lag
 from kfsheet.parts import Column, Parameter
 from kfsheet.recurrence import Recurrence
 from kfsheet.schedule import same_row
@@ -67,18 +65,8 @@ class World:
         self._seed = f"{scene.model.name}/{number}"
         self._known: dict[tuple[str, int], Value | NoValueError] = {}
 
-    def __call__(self, node: Basic, row: int) -> Value:
-        """Value of a symbol, or of a cell of a column, for a formula in ``row``."""
-        if node.is_Symbol:
-            return self._value(node.name, 0)
-        name, fixed, place = cell_of(node)
-        return self._value(name, place if fixed else row - place)
-
-    def cell(self, name: str, row: int) -> Value:
-        """Value of a column in a row."""
-        return self._value(name, row)
-
-    def _value(self, name: str, row: int) -> Value:
+    def __call__(self, name: str, row: int) -> Value:
+        """Value of a scalar (row 0), or of a column in a row."""
         key = (name, row)
         if key not in self._known:
             self._known[key] = NoValueError("it goes in a circle")
@@ -120,7 +108,7 @@ class World:
     def _datum(self, column: Column, row: int) -> Value:
         if column.name in self._own_data:
             value = self._own_data[column.name][row]
-            return None if isnan(value) else mpf(value)
+            return None if isnan(value) else exact(value)
         if column.may_be_missing and self._gap(column.name, row):
             return None
         return self._drawn(column.name, row, self._scene.base.columns[column.name])
@@ -140,29 +128,21 @@ class World:
 
     def _parameter(self, parameter: Parameter) -> Value:
         if parameter.name in self._own:
-            return mpf(self._own[parameter.name])
+            return exact(self._own[parameter.name])
         dice = self._random(parameter.name, 0)
         value = parameter.value * exp(dice.gauss(0, SPREAD)) or abs(dice.gauss(0, SPREAD))
         signed = self.wild and not parameter.sign and dice.random() < 0.5
-        return mpf(-value if signed else value)
+        return exact(-value if signed else value)
 
     def _drawn(self, name: str, row: int, base: list[float]) -> Value:
         """Near the model's own run, or anywhere in the column's range, with either sign."""
         dice, largest, few = self._random(name, row), *self._scene.range(name, base)
         if few:
-            return mpf(dice.choice(few))
+            return exact(dice.choice(few))
         own = base[row] if row < len(base) else 0.0
         if self.wild or isnan(own) or own == 0:
-            return mpf(dice.uniform(0, largest)) * self._sign(name, row)
-        return mpf(own * exp(dice.gauss(0, SPREAD)))
-
-
-@lru_cache(maxsize=10_000)
-def cell_of(node: Indexed) -> tuple[str, bool, int]:
-    """Column of a cell reference, whether its row is fixed, and the row or the lag."""
-    index = node.indices[0]
-    fixed = bool(index.is_Integer)
-    return str(node.base.label), fixed, int(index if fixed else lag(node))
+            return exact(dice.uniform(0, largest) * self._sign(name, row))
+        return exact(own * exp(dice.gauss(0, SPREAD)))
 
 
 class Scene:
