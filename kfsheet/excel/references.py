@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 from openpyxl.utils import column_index_from_string
 
@@ -119,6 +120,7 @@ def _corner(*parts: str | None) -> Corner | None:
     return Corner(int(row), column, bool(row_fixed), bool(column_fixed))
 
 
+@lru_cache(maxsize=50_000)
 def relative_key(text: str, host: Cell) -> str:
     """A text that two formulas share if one is the other, filled into another cell.
 
