@@ -144,11 +144,14 @@ def run_check(arguments: argparse.Namespace) -> int:
 
 
 def _check_one(path: Path, arguments: argparse.Namespace) -> int:
+    from kfsheet.excel.recalculate import Ahead
+
+    engine = Ahead(path, arguments.engine)  # it works while SymPy is imported
     from kfsheet.excel.check import check
     from kfsheet.excel.reading import Opened
     from kfsheet.exercises import exercise_names, load_exercise
 
-    book = Opened(path, arguments.engine)
+    book = Opened(engine)
     name = book.exercise_name()
     exercise = load_exercise(arguments.exercise) if arguments.exercise else None
     if exercise is None and name not in exercise_names():
@@ -159,7 +162,7 @@ def _check_one(path: Path, arguments: argparse.Namespace) -> int:
     exercise = exercise or load_exercise(name)
     if exercise.name != name:
         raise ModelError(f"{path} was built from {name!r}, not from {exercise.name!r}")
-    report = check(book, exercise, arguments.engine)
+    report = check(book, exercise)
     for change in report.changed:
         print(f"{path}: changed: {change}")
     lines = report.lines()

@@ -17,9 +17,9 @@ from kfsheet.coursework.worksheet import Content, Formula
 from kfsheet.coursework.worlds import Own
 from kfsheet.errors import FormulaError
 from kfsheet.excel.compose import Run, section_page
-from kfsheet.excel.layout import Address, Layout
+from kfsheet.excel.layout import Layout
 from kfsheet.excel.page import Piece, is_formula
-from kfsheet.excel.references import relative_key
+from kfsheet.excel.references import Address, relative_key
 from kfsheet.exercise import Exercise
 
 SAMPLE = 40  # rows of a long table that are looked at

@@ -14,9 +14,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from kfsheet.errors import EngineError, KfsheetError
-from kfsheet.excel.layout import Address
 from kfsheet.excel.package import Changes
 from kfsheet.excel.recalculate import CellValue, open_in
+from kfsheet.excel.references import Address
 
 
 def calculated(

@@ -43,8 +43,7 @@ from kfsheet.coursework.submission import Book
 from kfsheet.coursework.worksheet import Formula
 from kfsheet.coursework.worlds import Own, Scene
 from kfsheet.errors import ForbiddenError, FormulaError
-from kfsheet.excel.layout import Address
-from kfsheet.excel.references import Reference
+from kfsheet.excel.references import Address, Reference
 from kfsheet.exercise import Exercise
 from kfsheet.exercise import Question as Asked
 from kfsheet.expressions import Aggregate, Missing, lag, t

@@ -20,7 +20,7 @@ from kfsheet.coursework.judge import Mark
 from kfsheet.coursework.places import Places
 from kfsheet.coursework.submission import Book
 from kfsheet.errors import WorkbookError
-from kfsheet.excel.layout import Address
+from kfsheet.excel.references import Address
 
 COLOURS = {"full": "FFC6EFCE", "part": "FFFFEB9C", "none": "FFFFC7CE"}
 PART, RELATION = "xl/worksheets/kfsheetMarks.xml", "rIdKfsheetMarks"

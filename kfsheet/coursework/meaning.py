@@ -27,8 +27,7 @@ from kfsheet.excel.formula import (
     tree_to_sympy,
 )
 from kfsheet.excel.functions import as_number
-from kfsheet.excel.layout import Address
-from kfsheet.excel.references import Reference, relative_key
+from kfsheet.excel.references import Address, Reference, relative_key
 from kfsheet.expressions import Missing, t
 from kfsheet.recurrence import Recurrence
 

@@ -12,8 +12,7 @@ from dataclasses import dataclass, field
 from kfsheet.coursework.submission import Book
 from kfsheet.coursework.worksheet import Content
 from kfsheet.errors import FormulaError
-from kfsheet.excel.layout import Address
-from kfsheet.excel.references import Cell, read_reference
+from kfsheet.excel.references import Address, Cell, read_reference
 from kfsheet.recurrence import Recurrence
 
 

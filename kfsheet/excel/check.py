@@ -20,10 +20,10 @@ from pathlib import Path
 from kfsheet.errors import DataError
 from kfsheet.excel.compare import Comparison
 from kfsheet.excel.compose import Run
-from kfsheet.excel.layout import Address
 from kfsheet.excel.package import Changes
 from kfsheet.excel.reading import Inputs, Opened, layout_of, place
-from kfsheet.excel.recalculate import Values
+from kfsheet.excel.recalculate import Ahead, Values
+from kfsheet.excel.references import Address
 from kfsheet.exercise import Exercise
 
 TOLERANCES = {"ironcalc": 1e-12, "libreoffice": 1e-11}
@@ -106,28 +106,32 @@ def check_workbook(path: str | Path, exercise: Exercise, engine: str = "ironcalc
     EngineError
         If the engine cannot do its work.
     """
-    return check(Opened(path, engine), exercise, engine)
+    return check(Opened(Ahead(path, engine)), exercise)
 
 
-def check(book: Opened, exercise: Exercise, engine: str) -> Report:
+def check(book: Opened, exercise: Exercise) -> Report:
     """Compare a workbook that is open in an engine; see :func:`check_workbook`."""
-    layout = layout_of(book, exercise)
     built = Run.of(exercise.model)
+    layout = layout_of(book, exercise)
     inputs = Inputs(book, layout)
+    changed, engine = list(_changed(inputs, built)), book.engine.name
+    # The engine calculates the next ones while the first are compared.
+    trials = [(book.engine.ask(trial[0]), words, *trial[1:]) for words, trial in _trials(inputs)]
 
-    def compare(values: Values, data: Data, parameters: dict[str, float]) -> Comparison:
-        now = Run.of(exercise.model, data, parameters)
+    def compare(values: Values, now: Run) -> Comparison:
         comparison = Comparison(book, layout, values, TOLERANCES[engine])
         comparison.run(exercise, now, built)
         return comparison
 
-    first = compare(book.values, inputs.data, inputs.parameters)
+    as_it_stands = Run.of(exercise.model, inputs.data, inputs.parameters) if changed else built
+    first = compare(book.values, as_it_stands)
     found, differing = first.problems, set(first.differing)
-    for words, (changes, data, parameters) in _trials(inputs):
+    for values, words, data, parameters in trials:
         try:
-            trial = compare(book.engine.values(changes), data, parameters)
+            now = Run.of(exercise.model, data, parameters)
         except DataError:
             continue  # the model has no value there; the other comparisons have to do
+        trial = compare(values.result(), now)
         told = {address: f"{reason} ({words})" for address, reason in trial.problems.items()}
         found, differing = {**told, **found}, differing | set(trial.differing)
     return Report(
@@ -135,7 +139,7 @@ def check(book: Opened, exercise: Exercise, engine: str) -> Report:
         engine,
         first.cells,
         first.largest,
-        list(_changed(inputs, built)),
+        changed,
         _in_order(found, book.package.titles),
         len(differing - set(found)),
     )

@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import cached_property
+from itertools import repeat
 from typing import Any
 
 import numpy as np
@@ -31,10 +32,11 @@ from kfsheet.excel.compose import (
     parameters_page,
     section_page,
 )
-from kfsheet.excel.layout import FIRST_ROW, Address, Layout
+from kfsheet.excel.layout import FIRST_ROW, Layout
 from kfsheet.excel.page import Filled, Page, Piece, is_formula
 from kfsheet.excel.reading import Opened
 from kfsheet.excel.recalculate import Values
+from kfsheet.excel.references import Address
 from kfsheet.exercise import Exercise
 from kfsheet.expressions import lag, t
 from kfsheet.pythoncode import python_code
@@ -82,17 +84,15 @@ class Comparison:
     def _whole(self, sheet: str, at: int, filled: Filled) -> bool:
         """Whether a column agrees as a whole, so that none of its cells needs words."""
         rows, cells = filled.rows, self.values.get(sheet, {})
-        found = [cells.get((row, at)) for row in rows]
+        found = list(map(cells.get, zip(rows, repeat(at), strict=False)))
         if not filled.rules:
             return filled.kind != "index" or found == list(filled.values)
         hollow = {filled.first + n for n, rule in enumerate(filled.rules) if rule is None}
         formulas = {row for row in self.book.formula_rows(sheet, at) if row in rows}
         if formulas != set(rows) - hollow or bool in set(map(type, found)):
             return False
-        missing = (None, "", filled.missing)
-        try:
-            numbers = np.array([math.nan if v in missing else v for v in found], dtype=float)
-        except ValueError:
+        numbers = _numbers(found, filled.missing)
+        if numbers is None:
             return False
         expected = np.array(filled.values, dtype=float)
         size = np.fmax(np.abs(expected), filled.scale)
@@ -232,6 +232,16 @@ class Comparison:
                 return f"{name}, {model.step_of(sheet)} {row - FIRST_ROW}: "
         names = (name for name, cell in self.layout.scalars.items() if cell == address)
         return next((f"{name}: " for name in names), "")
+
+
+def _numbers(found: list[Any], missing: str) -> np.ndarray | None:
+    """Values of a column, NaN where there is none; None if something else stands in it."""
+    if not set(map(type, found)) <= {float, int}:
+        found = [math.nan if v in (None, "", missing) else v for v in found]
+    try:
+        return np.array(found, dtype=float)
+    except ValueError:
+        return None
 
 
 def _plain(content: Any) -> str:

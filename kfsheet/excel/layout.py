@@ -8,13 +8,14 @@ second. Parameters, derived scalars and summaries are defined names, equal to th
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from openpyxl.utils import get_column_letter, quote_sheetname
 from sympy import Basic, Expr, Indexed, IndexedBase, Symbol
 
 from kfsheet.errors import PrintError
 from kfsheet.excel.printer import HARD_LIMIT, excel_code
+from kfsheet.excel.references import Address
 from kfsheet.expressions import Last, lag, t
 from kfsheet.recurrence import Recurrence
 
@@ -23,9 +24,6 @@ PARAMETER_ROW = 5
 
 FIRST_CHART_ROW, ROWS_A_CHART = 4, 24
 CHART_COLUMNS = (1, 11)  # in which a chart begins: two charts beside each other
-
-Address = tuple[str, int, int]
-"""Sheet, row, column; rows and columns count from 1."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +37,9 @@ class Layout:
     model: Recurrence
     columns: dict[str, dict[str, int]]
     scalars: dict[str, Address]
+    _templates: dict[tuple[Expr, str], tuple[str, int]] = field(
+        default_factory=dict, repr=False, compare=False
+    )
 
     @classmethod
     def standard(cls, model: Recurrence) -> Layout:
@@ -91,12 +92,19 @@ class Layout:
 
         The expression is printed once; rows only fill in numbers, which keeps large sheets cheap.
         """
-        names = _Names(self, sheet)
-        template = "=" + excel_code(expression, names)
-        depth = range(names.depth + 1)
+        template, deepest = self._template(expression, sheet)
+        depth = range(deepest + 1)
         if len(template.format(*(self.last_row for _ in depth))) > HARD_LIMIT:
             raise PrintError(f"a formula on {sheet} is longer than {HARD_LIMIT}: {template}")
         return lambda row: template.format(*(row - back for back in depth))
+
+    def _template(self, expression: Expr, sheet: str) -> tuple[str, int]:
+        """A formula with a place for every row, and how far back it looks."""
+        key = (expression, sheet)
+        if key not in self._templates:
+            names = _Names(self, sheet)
+            self._templates[key] = "=" + excel_code(expression, names), names.depth
+        return self._templates[key]
 
 
 class _Names:

@@ -19,7 +19,7 @@ from openpyxl.utils import column_index_from_string, coordinate_to_tuple, get_co
 from openpyxl.workbook.defined_name import DefinedName
 
 from kfsheet.errors import WorkbookError
-from kfsheet.excel.layout import Address
+from kfsheet.excel.references import Address
 
 Changes = dict[str, dict[tuple[int, int], float | None]]
 """Numbers to put into cells before calculating, by sheet and (row, column); None empties one."""

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 from openpyxl import Workbook
 from openpyxl.utils import get_column_letter
 
 from kfsheet.errors import DataError, WorkbookError
-from kfsheet.excel.layout import FIRST_ROW, SYMBOL_ROW, Address, Layout, quote
+from kfsheet.excel.layout import FIRST_ROW, SYMBOL_ROW, Layout, quote
 from kfsheet.excel.package import Package
-from kfsheet.excel.recalculate import CellValue, Values, open_in, open_workbook
+from kfsheet.excel.recalculate import Ahead, CellValue, Values, open_workbook
+from kfsheet.excel.references import Address
 from kfsheet.exercise import Exercise
 from kfsheet.recurrence import Recurrence
 
@@ -22,12 +22,15 @@ EXERCISE_NAME = "kfsheet_exercise"
 class Opened:
     """A workbook as it stands: its names and formula cells, and the values an engine finds."""
 
-    def __init__(self, path: str | Path, engine: str = "ironcalc") -> None:
-        self.path = Path(path)
-        self.package = Package(path)
-        self.engine = open_in(path, engine)
-        self.values: Values = self.engine.values()
-        self._formulas: dict[str, dict[int, set[int]]] = {}
+    def __init__(self, engine: Ahead) -> None:
+        self.path, self.engine = engine.path, engine
+        self.package = Package(engine.path)
+        self._formulas = {title: self.package.formulas(title) for title in self.package.titles}
+
+    @cached_property
+    def values(self) -> Values:
+        """What the engine finds."""
+        return self.engine.values
 
     def value(self, address: Address) -> CellValue:
         """What the engine found in a cell."""
@@ -36,10 +39,7 @@ class Opened:
 
     def formula_rows(self, sheet: str, column: int) -> set[int]:
         """Rows of a column that hold formulas."""
-        if sheet not in self._formulas:
-            known = sheet in self.package.titles
-            self._formulas[sheet] = self.package.formulas(sheet) if known else {}
-        return self._formulas[sheet].get(column, set())
+        return self._formulas.get(sheet, {}).get(column, set())
 
     def is_formula(self, address: Address) -> bool:
         """Whether a cell holds a formula."""

@@ -12,6 +12,8 @@ import tempfile
 import warnings
 import zipfile
 import zlib
+from concurrent.futures import Future, ThreadPoolExecutor
+from itertools import starmap
 from pathlib import Path
 from typing import Protocol
 from xml.etree.ElementTree import ParseError
@@ -102,6 +104,29 @@ def open_workbook(path: str | Path, *, data_only: bool = False) -> openpyxl.Work
         raise WorkbookError(f"{path} is not a workbook (.xlsx): {detail}") from None
 
 
+class Ahead:
+    """A workbook in an engine that works in a thread of its own, in the order it is asked.
+
+    IronCalc lets go of Python's lock while it loads and calculates, so it costs no time that can be
+    filled otherwise. Errors come with the values.
+    """
+
+    def __init__(self, path: str | Path, engine: str = "ironcalc") -> None:
+        self.path, self.name = Path(path), engine
+        self._pool = ThreadPoolExecutor(1)
+        self._opened = self._pool.submit(open_in, path, engine)
+        self._stands = self.ask(None)
+
+    @property
+    def values(self) -> Values:
+        """What the engine finds in the workbook as it stands."""
+        return self._stands.result()
+
+    def ask(self, changes: Changes | None) -> Future[Values]:
+        """What it finds with numbers put in first; see :func:`recalculate`."""
+        return self._pool.submit(lambda: self._opened.result().values(changes))
+
+
 class IronCalc:
     """A workbook in IronCalc: loaded once, calculated as often as inputs change."""
 
@@ -130,9 +155,10 @@ class IronCalc:
         except Exception as error:
             raise EngineError(f"IronCalc cannot calculate the workbook: {error}") from None
         found: list[dict[tuple[int, int], CellValue]] = [{} for _ in self._sheets]
-        read = self._model.get_cell_value
-        for sheet, row, column in self._model.get_all_cells():
-            if (value := read(sheet, row, column)) is not None:
+        cells = self._model.get_all_cells()
+        values = starmap(self._model.get_cell_value, cells)
+        for (sheet, row, column), value in zip(cells, values, strict=True):
+            if value is not None:
                 found[sheet][row, column] = value
         return dict(zip(self._sheets, found, strict=True))
 

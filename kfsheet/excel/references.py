@@ -18,6 +18,8 @@ from kfsheet.names import LAST_COLUMN, LAST_ROW
 
 Cell = tuple[int, int]
 """Row and column, counted from 1."""
+Address = tuple[str, int, int]
+"""Sheet, row and column."""
 
 CORNER = r"(\$?)([A-Za-z]{1,3})(\$?)([1-9]\d{0,6})"
 SHEET = r"(?:'((?:[^']|'')+)'|([^'!\[\]:*?/\\ ]+))!"

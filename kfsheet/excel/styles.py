@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from functools import cached_property
-from math import floor, isfinite, log10, sqrt
+from math import floor, log10, sqrt
 
+import numpy as np
 from openpyxl import Workbook
 from openpyxl.cell import Cell
 from openpyxl.styles import Alignment, Border, Font, PatternFill, Protection, Side
@@ -90,11 +91,12 @@ class Styles:
 
 def number_format(values: list[float]) -> str:
     """Four figures at the column's root mean square, or more; scientific where that is tiny."""
-    numbers = [v for v in values if isinstance(v, int | float) and isfinite(v)]
-    size = sqrt(sum(v * v for v in numbers) / len(numbers)) if numbers else 0
+    numbers = np.array(values, dtype=float)
+    numbers = numbers[np.isfinite(numbers)]
+    size = sqrt(np.square(numbers).mean()) if len(numbers) else 0
     if size == 0:
         return "0.000"
-    if size < 1e6 and all(v == round(v) for v in numbers):
+    if size < 1e6 and (numbers == np.round(numbers)).all():
         return "General"  # counts and switches; a fraction would still show
     magnitude = floor(log10(size))
     if not -4 <= magnitude <= 6:
