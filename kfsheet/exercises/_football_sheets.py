@@ -114,8 +114,8 @@ TASK = (
     "Forecast. x_f(t) = x_a(t-1) + u(t) dt - h f |u(t)| u(t) dt^p, and z_f(t) likewise from w, "
     "less h g dt^2; in photo 0 they are x_0 and z_0. The switches h and p are parameters.",
     "Camera. It sees i = a x and j = j_0 - a z, with variances r_i and r_j; the forecast errs with "
-    "variances b_x and b_z. So H is a for x and -a for z, B and R are diagonal, and an innovation "
-    "is the pixel seen less the pixel of the forecast. Without a photo there is no innovation, "
-    "and the analysis is the forecast.",
-    "Analysis. x_a = x_f + K d with the gain K = B H' (R + H B H')^-1, one for x, one for z.",
+    "variances b_x and b_z. So H is a for x and -a for z, B and R are diagonal, and the innovations "
+    "d_i and d_j are the pixel seen less the pixel of the forecast. Without a photo there is no "
+    "innovation, and the analysis is the forecast.",
+    "Analysis. The gain is K = B H' (R + H B H')^-1: K_x takes d_i to x_a, K_z takes d_j to z_a.",
 )
