@@ -149,7 +149,7 @@ def _with_words(xml: str, cells: dict[str, Mark], numbers: dict[str, int]) -> st
 def _cell(place: str, content: str | float, style: int | None) -> str:
     if isinstance(content, str):
         return _inline(place, content, style)
-    return f'<c r="{place}"{_look(style)}><v>{content:g}</v></c>'
+    return f'<c r="{place}"{_look(style)}><v>{content!r}</v></c>'
 
 
 def _look(style: int | None) -> str:
