@@ -158,7 +158,8 @@ def _look(style: int | None) -> str:
 
 def _inline(place: str, words: str, style: int | None = None) -> str:
     text = escape("".join(c for c in words if c.isprintable()))
-    return f'<c r="{place}"{_look(style)} t="inlineStr"><is><t xml:space="preserve">{text}</t></is></c>'
+    content = f'<is><t xml:space="preserve">{text}</t></is>'
+    return f'<c r="{place}"{_look(style)} t="inlineStr">{content}</c>'
 
 
 def _sheet(marks: Sequence[Mark], numbers: dict[str, int], total: float | None) -> str:

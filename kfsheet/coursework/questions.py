@@ -32,8 +32,8 @@ HOW = (
     "Fill in the orange cells on the sheets named below: a formula in each, from top to bottom. "
     "Everything that follows from them is live, charts too. Helper cells may stand anywhere beside "
     "the tables. A formula must follow when a parameter or a measurement changes: type no number "
-    'that stands in a cell. Where there is no value the formula gives the empty text "", as those '
-    "beside it do; ISNUMBER asks for it."
+    'that stands in a cell. Where there is no value, a formula gives the empty text "", as the '
+    "others do; ISNUMBER tells whether there is one."
 )
 FEEDBACK = (
     "An answer that is right looks not yet so as long as one that it is computed from is wrong; "
