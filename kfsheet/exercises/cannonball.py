@@ -228,7 +228,7 @@ exercise = Exercise(
     notebook="notebooks/02_cannonball.ipynb",
     sections=SECTIONS,
     greyed="in_flight",
-    alarm="landed",
+    alarm=("landed",),
     vary={
         "v_0": (850, 910),
         "angle": (40, 45),
