@@ -6,14 +6,15 @@ import argparse
 import os
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from kfsheet import __version__
 from kfsheet.errors import DataError, KfsheetError, ModelError, WorkbookError
 
 if TYPE_CHECKING:
+    from kfsheet.coursework.assessing import Assessment
     from kfsheet.excel.check import Report
 
 HOLDS, DOES_NOT_HOLD, WRONG_USE = 0, 1, 2
@@ -124,7 +125,7 @@ def run_build(arguments: argparse.Namespace) -> int:
     if Path(arguments.out).suffix == ".xlsx":
         raise WorkbookError(f"--out {arguments.out} is a file name; give a folder")
     written = []
-    for exercise in progress(exercises, "build", [e.name for e in exercises]):
+    for exercise in progress(exercises, "build", len(exercises), lambda e: e.name):
         written.append(write_workbook(exercise, Path(arguments.out), force=arguments.force))
     for path in written:
         print(path)
@@ -134,7 +135,7 @@ def run_build(arguments: argparse.Namespace) -> int:
 def run_check(arguments: argparse.Namespace) -> int:
     """Check workbooks; one that cannot be checked does not keep the others from it."""
     status = HOLDS
-    for path in progress(arguments.workbooks, "check", arguments.workbooks):
+    for path in progress(arguments.workbooks, "check", len(arguments.workbooks)):
         try:
             status = max(status, _check_one(Path(path), arguments))
         except KfsheetError as error:
@@ -214,9 +215,9 @@ def run_handout(arguments: argparse.Namespace) -> int:
     made = write_handouts(
         exercise, arguments.exercise, students, secret, arguments.out, jobs=arguments.jobs
     )
-    numbers = list(map(str, range(1, len(students) + 1)))
-    count = sum(1 for _ in progress(made, "handout", numbers))
-    print(f"{count} workbooks in {Path(arguments.out) / 'students'}")
+    for _ in progress(made, "handout", len(students), lambda path: path.parent.name):
+        pass
+    print(f"{len(students)} workbooks in {Path(arguments.out) / 'students'}")
     print(f"their solutions in {Path(arguments.out) / 'solutions'}; do not hand these out")
     if arguments.notebook:
         from kfsheet.coursework.notebook import write_assignment
@@ -246,7 +247,7 @@ def run_grade(arguments: argparse.Namespace) -> int:
         _secret(arguments, make=False),
         out,
         jobs=arguments.jobs,
-        progress=lambda items, count: progress(items, "grade", list(map(str, range(1, count + 1)))),
+        progress=lambda items, count: progress(items, "grade", count, _judged),
     )
     results = override([with_all_marks(r, exercise) for r in results], iter(lines))
     for path in write_reports(exercise, results, handed, out):
@@ -260,15 +261,21 @@ def run_grade(arguments: argparse.Namespace) -> int:
     return HOLDS
 
 
-def progress(items: Iterable, verb: str, names: list[str]) -> Iterator:
-    """Yield items behind a progress bar on a terminal, plain lines elsewhere."""
+def _judged(item: tuple[Path, Assessment]) -> str:
+    """Whose file it was, or what it is called, and what came of it."""
+    path, found = item
+    return f"{found.student or path.name}, {found.status}"
+
+
+def progress(items: Iterable, verb: str, count: int, name: Callable[[Any], str] = str) -> Iterator:
+    """Yield ``count`` items behind a progress bar on a terminal, each named in a line elsewhere."""
     if sys.stderr.isatty():
         from tqdm import tqdm
 
-        yield from tqdm(items, desc=verb, total=len(names), leave=False)
+        yield from tqdm(items, desc=verb, total=count, leave=False)
         return
-    for n, (item, name) in enumerate(zip(items, names, strict=True), 1):
-        print(f"{verb} {n}/{len(names)}: {name}", file=sys.stderr)
+    for n, item in enumerate(items, 1):
+        print(f"{verb} {n}/{count}: {name(item)}", file=sys.stderr)
         yield item
 
 

@@ -48,8 +48,8 @@ class Exercise:
         What each worksheet holds, by its name.
     greyed : str
         A column that is 0 in rows that no longer count; they are shown in grey.
-    alarm : str
-        A summary that is 0 if the results are not what they seem; its cell is then red.
+    alarm : tuple of str
+        Summaries that are 0 if results are not what they seem; such a one is then red.
     vary : dict
         Parameters that differ from student to student: lowest and highest value by name.
     noise : tuple of str
@@ -78,7 +78,7 @@ class Exercise:
     notebook: str = ""
     sections: dict[str, str] = field(default_factory=dict)
     greyed: str = ""
-    alarm: str = ""
+    alarm: tuple[str, ...] = ()
     vary: dict[str, tuple[float, float]] = field(default_factory=dict)
     noise: tuple[str, ...] = ()
     frozen: tuple[str, ...] = ()
@@ -90,6 +90,7 @@ class Exercise:
         for name, kind in (
             ("about", str),
             ("task", str),
+            ("alarm", str),
             ("charts", Chart),
             ("questions", Question),
         ):
@@ -106,8 +107,8 @@ class Exercise:
             self._check_question(question)
         if self.greyed:
             self.model.column(self.greyed)
-        if self.alarm and self.alarm not in self.model.summaries:
-            raise ModelError(f"{self.name}: alarm names {self.alarm}, which is no summary")
+        for name in set(self.alarm) - set(self.model.summaries):
+            raise ModelError(f"{self.name}: alarm names {name}, which is no summary")
         if unknown := {*self.sections, *self.frozen} - set(self.model.sections):
             raise ModelError(f"{self.name} has no section {unknown.pop()!r}")
         for name in set(self.veiled) - set(self.model.derived_scalars):

@@ -111,7 +111,9 @@ def test_results_that_cover_a_part_of_the_flight_turn_red():
         )
     assert f"<formula>$G${row}=0</formula>" in rules
     with pytest.raises(ModelError, match="alarm names e_x_a, which is no summary"):
-        replace(exercise, alarm="e_x_a")
+        replace(exercise, alarm=("landed", "e_x_a"))
+    with pytest.raises(ModelError, match="with a comma even after a single one"):
+        replace(exercise, alarm="landed")
 
 
 def test_every_error_on_a_chart_has_the_band_that_its_filter_claims(frame):

@@ -356,7 +356,9 @@ def test_every_student_gets_the_own_workbook_with_marks_beside_the_answers(grade
     assert book["Parameters"]["D23"].value == "2/2: right."
     assert book["Charts"]._charts
     values = recalculate(marked, engine)
+    scores = [values["Marks"][row, 3] for row in range(2, 13)]
     assert values["Marks"][12, 1] == "total"
+    assert sum(scores[:-1]) == scores[-1] == 16, "numbers, to calculate with"
     assert "a sign is wrong" in (graded / "feedback" / "s002.html").read_text()
     assert (graded / "feedback" / "s007.html").exists()
     assert not (graded / "feedback" / "s007.xlsx").exists()
@@ -398,13 +400,44 @@ def test_a_second_run_goes_on_and_keeps_what_a_lecturer_changed(course, graded):
     (graded / "overrides.csv").write_text("id,question,score,remark\n")
 
 
+def test_a_file_that_had_no_time_is_tried_again(course, tmp_path):
+    """A machine was busy, or was switched off: the next run judges what this one could not."""
+    _, _, sub = course
+    (tmp_path / "in").mkdir()
+    shutil.copy(sub / "x" / "football (2).xlsx", tmp_path / "in" / "bob.xlsx")
+
+    def status(seconds):
+        judge = (FOOTBALL, "football", tmp_path / "in", STUDENTS, SECRET, tmp_path / "out")
+        _, (handed,) = grade(*judge, seconds=seconds)
+        return handed.assessment.status, handed.assessment.student
+
+    assert status(0.01) == ("timed out", "")
+    assert status(60) == ("graded", "s002")
+    assert status(0.01) == ("graded", "s002"), "that is kept"
+
+
+def test_progress_is_told_by_student(course, tmp_path, capsys):
+    home, ask, sub = course
+    (tmp_path / "in").mkdir()
+    shutil.copy(sub / "x" / "football (2).xlsx", tmp_path / "in" / "1.xlsx")
+    (tmp_path / "in" / "2.xlsx").write_bytes(b"")
+    assert call("grade", "football", tmp_path / "in", *ask, "--out", tmp_path / "g") == 0
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == ["grade 1/2: s002, graded", "grade 2/2: 2.xlsx, empty file"]
+    (tmp_path / "roster.csv").write_text("id,name\nq7,Ada\n")
+    ask = ("--roster", tmp_path / "roster.csv", "--out", tmp_path / "h")
+    assert call("handout", "football", *ask) == 0
+    assert capsys.readouterr().err.splitlines() == ["handout 1/1: q7"]
+    assert (tmp_path / "kfsheet.secret").stat().st_mode & 0o777 == 0o600
+
+
 def test_the_students_own_workbook_shows_what_a_lecturer_changed(course, graded):
     home, ask, sub = course
     (graded / "overrides.csv").write_text("id,question,score,remark\ns002,u,1.5,kind\n")
     assert call("grade", "football", sub, *ask, "--out", graded) == 0
     marks = openpyxl.load_workbook(graded / "feedback" / "s002.xlsx")["Marks"]
     line = next(row for row in marks.values if row[0] == "u")
-    assert line[1:] == ("2", "1.5", "wrong", "kind")
+    assert line[1:] == (2, 1.5, "wrong", "kind")
     assert (
         "1.5/2" in openpyxl.load_workbook(graded / "feedback/s002.xlsx")["Reanalysis"]["E3"].value
     )

@@ -327,6 +327,44 @@ def test_locked_cells_that_were_edited_are_named_and_change_no_mark(football):
         assert name in found.remark
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"x_f": " x_f "},
+        {"x_f": "forecast"},
+        {"x_f": None},
+        {"photo": "number", "time": "t"},
+        {"i": "pixel"},
+        {"x_f": "f", "z_f": "g", "z_a": "analysis"},
+    ],
+)
+def test_a_header_that_was_changed_costs_no_answer(football, change):
+    """The column is still where it was, beside the others of its table."""
+    sheet = football.answer_all().book["Reanalysis"]
+    places = {cell.value: cell for cell in sheet[1]}
+    for name, words in change.items():
+        places[name].value = words
+    found, marks = judged(football)
+    assert (found.status, found.remark) == ("graded", "")
+    assert {m.status for m in marks.values()} == {"right"}
+
+
+def test_a_header_that_was_changed_is_found_among_inserted_columns(football):
+    do.inserted(football.answer_all().book, football.model.sections, columns=2)
+    football.book["Reanalysis"].cell(3, 9).value = "mine"  # x_f
+    _, marks = judged(football)
+    assert {m.status for m in marks.values()} == {"right"}
+
+
+def test_a_table_without_most_of_its_headers_is_gone(football):
+    sheet = football.answer_all().book["Reanalysis"]
+    for cell in sheet[1][3:]:
+        cell.value = None
+    found, marks = judged(football)
+    on_the_sheet = {n: m.status for n, m in marks.items() if n not in ("K_x", "K_z")}
+    assert set(on_the_sheet.values()) == {"gone"}
+
+
 def test_a_cell_that_reads_its_own_consequences_goes_in_a_circle(football):
     """x_f from x_a, which follows from x_f: an identity, but no answer."""
     football.answer_all()

@@ -1,12 +1,17 @@
 """The calculators of the tennis workbook: cells against the library and against the report."""
 
+from pathlib import Path
+
 import numpy as np
+import openpyxl
 import pytest
 
 from kfsheet import evaluate
 from kfsheet.exercises.tennis import tennis
 from kfsheet.tennis.cameras import error_diamond, rms_error
 from kfsheet.tennis.centroid import centroid, lambert_shift
+
+WORKBOOKS = Path(__file__).parents[1] / "workbooks"
 
 
 def test_the_cameras_sheet_is_the_library():
@@ -55,6 +60,19 @@ def test_a_ball_that_the_rows_do_not_hold_is_noticed(values, fits):
     whole = [(image * n).sum() / image.sum() for n in (i, j)]
     found = [scalars["i_centroid"], scalars["j_centroid"]]
     assert scalars["ball_fits"] == fits == (found == pytest.approx(whole))
+
+
+@pytest.mark.parametrize("name", ["tennis", "tennis_toss"])
+def test_every_result_that_warns_turns_red_in_the_workbook(name):
+    """Summaries whose words begin with "1: ... 0:" say whether the others mean anything."""
+    warnings = {n for n, s in tennis.summaries.items() if s.description.startswith("1: ")}
+    assert {"ball_fits", "landed"} <= warnings
+    sheet = openpyxl.load_workbook(WORKBOOKS / f"{name}.xlsx")["Parameters"]
+    rules = {
+        r.formula[0]: str(area.sqref) for area in sheet.conditional_formatting for r in area.rules
+    }
+    rows = {sheet.cell(row, 6).value: row for row in range(5, sheet.max_row + 1)}
+    assert rules == {f"$G${rows[n]}=0": f"F{rows[n]}:I{rows[n]}" for n in warnings}
 
 
 def test_the_centroid_sheet_shows_the_shift():

@@ -62,7 +62,7 @@ def executed(source: Path) -> nbformat.NotebookNode:
 def main(names: list[str]) -> None:
     """Execute the notebooks named, or all."""
     sources = [Path(name) for name in names] or sorted(FOLDER.glob("*.py"))
-    for source in progress(sources, "notebook", [s.name for s in sources]):
+    for source in progress(sources, "notebook", len(sources), lambda s: s.name):
         text = nbformat.writes(executed(source)) + "\n"
         write_file(source.with_suffix(".ipynb"), text.encode())
 

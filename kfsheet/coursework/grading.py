@@ -21,7 +21,7 @@ from kfsheet.exercise import Exercise
 from kfsheet.files import write_file
 
 MISSING, FOREIGN = "no submission", "somebody else's file"
-TIMED_OUT, CRASHED = "timed out", "crashed"
+TIMED_OUT, CRASHED = NOT_FINAL = "timed out", "crashed"
 STATUSES = {
     GRADED: "the answers were judged; see the marks",
     "untouched": "the workbook came back with no answer filled in",
@@ -110,7 +110,8 @@ def grade(
         Anything with the interface of :mod:`concurrent.futures` that judges in the place of
         ``jobs`` processes; its workers must see the same files, and be allowed to start processes.
     progress : function, optional
-        Wraps the files as they are finished; called with them and their number.
+        Wraps files as they are finished, pairs of path and assessment; called with them and their
+        number.
 
     Returns
     -------
@@ -171,11 +172,12 @@ def _judged(
     new = {key: path for path, key in keys.items() if key not in known}
     tasks = [(spec, secret, path, work / f"{key}.xlsx") for key, path in new.items()]
     names = {path: key for key, path in new.items()}
-    for task, found in progress(run(tasks), len(tasks)):
-        key = names[task[2]]
-        known[key] = _failed(found) if isinstance(found, Failed) else found
-        if not isinstance(found, Failed):
-            write_file(work / f"{key}.json", json.dumps(found.as_dict()).encode())
+    judged = ((path, _assessment(found)) for (_, _, path, _), found in run(tasks))
+    for path, found in progress(judged, len(tasks)):
+        known[names[path]] = found
+        if found.status not in NOT_FINAL:  # a busy machine; the next run tries again
+            content = json.dumps(found.as_dict()).encode()
+            write_file(work / f"{names[path]}.json", content)
     return known
 
 
@@ -187,7 +189,9 @@ def _kept(work: Path, key: str) -> Assessment | None:
         return None
 
 
-def _failed(found: Failed) -> Assessment:
+def _assessment(found: Assessment | Failed) -> Assessment:
+    if isinstance(found, Assessment):
+        return found
     status = TIMED_OUT if found.reason == "timed out" else CRASHED
     return Assessment(status, f"{STATUSES[status]} ({found.reason})")
 

@@ -146,24 +146,34 @@ def _with_words(xml: str, cells: dict[str, Mark], numbers: dict[str, int]) -> st
     return xml
 
 
+def _cell(place: str, content: str | float, style: int | None) -> str:
+    if isinstance(content, str):
+        return _inline(place, content, style)
+    return f'<c r="{place}"{_look(style)}><v>{content!r}</v></c>'
+
+
+def _look(style: int | None) -> str:
+    return f' s="{style}"' if style is not None else ""
+
+
 def _inline(place: str, words: str, style: int | None = None) -> str:
-    look = f' s="{style}"' if style is not None else ""
     text = escape("".join(c for c in words if c.isprintable()))
-    return f'<c r="{place}"{look} t="inlineStr"><is><t xml:space="preserve">{text}</t></is></c>'
+    content = f'<is><t xml:space="preserve">{text}</t></is>'
+    return f'<c r="{place}"{_look(style)} t="inlineStr">{content}</c>'
 
 
 def _sheet(marks: Sequence[Mark], numbers: dict[str, int], total: float | None) -> str:
     """The worksheet "Marks"."""
     lines = [(HEADS, None)]
     for m in marks:
-        cells = (m.name, str(m.points), f"{m.score:g}", m.status, m.remark)
+        cells = (m.name, m.points, m.score, m.status, m.remark)
         lines.append((cells, numbers[colour_of(m)]))
     points, score = sum(m.points for m in marks), sum(m.score for m in marks)
     given = score if total is None else total
-    lines.append((("total", str(points), f"{given:g}", "", ""), None))
+    lines.append((("total", points, given, "", ""), None))
     rows = "".join(
         f'<row r="{row}">'
-        + "".join(_inline(f"{'ABCDE'[n]}{row}", word, style) for n, word in enumerate(cells))
+        + "".join(_cell(f"{'ABCDE'[n]}{row}", content, style) for n, content in enumerate(cells))
         + "</row>"
         for row, (cells, style) in enumerate(lines, 1)
     )

@@ -1,8 +1,8 @@
 """Where the columns and scalars of an exercise stand in a workbook that came back.
 
 Rows and columns may have been inserted, sheets renamed or moved. A table is found by its header
-(the symbols of one section, all in one row), its rows by the step index beside them; a scalar by
-its defined name, or else by the label to its left.
+(the symbols of one section in one row, most of which must still be there), its rows by the step
+index beside them; a scalar by its defined name, or else by the label to its left.
 """
 
 from __future__ import annotations
@@ -14,6 +14,9 @@ from kfsheet.coursework.worksheet import Content
 from kfsheet.errors import FormulaError
 from kfsheet.excel.references import Address, Cell, read_reference
 from kfsheet.recurrence import Recurrence
+
+Rows = dict[int, dict[str, int]]
+"""Column by text, by row: whatever might be the header of a table."""
 
 
 @dataclass
@@ -40,8 +43,9 @@ class Places:
     def find(cls, book: Book, model: Recurrence) -> Places:
         """Look through a workbook."""
         places = cls(model)
+        headers = {sheet: _headers(cells) for sheet, cells in book.sheets.items()}
         for section in model.sections:
-            table = _find_table(book, model, section)
+            table = _find_table(book, headers, model, section)
             if table:
                 places.tables.setdefault(table.sheet, []).append(table)
                 for number, name in table.columns.items():
@@ -72,33 +76,53 @@ class Places:
         return None
 
 
-def _find_table(book: Book, model: Recurrence, section: str) -> Table | None:
-    wanted = {column.name for column in model.sections[section]}
+def _find_table(
+    book: Book, headers: dict[str, Rows], model: Recurrence, section: str
+) -> Table | None:
+    """Below the row that holds the most of a section's symbols, and more than half of them."""
     step = model.step_of(section)
-    keys = {step, *(clock.name for clock in model.clock_of(section)), *wanted}
-    anchor = next(iter(wanted))
-    for sheet, cells in book.sheets.items():
-        for (row, _), content in cells.items():
-            if content == anchor and (header := _header(cells, row)).keys() >= keys:
-                columns = {header[name]: name for name in keys}
-                columns[header[step]] = "t"
-                steps = _steps(cells, header[step], row, model.rows)
-                return Table(sheet, columns, steps, {k: r for r, k in steps.items()}, row)
-    return None
+    order = [step, *(c.name for c in (*model.clock_of(section), *model.sections[section]))]
+    symbols = set(order)
+    counts = {
+        (sheet, row): len(header.keys() & symbols)
+        for sheet, rows in headers.items()
+        for row, header in rows.items()
+    }
+    if 2 * max(counts.values(), default=0) <= len(order):
+        return None
+    sheet, row = max(counts, key=counts.get)
+    places = {name: _column_of(name, order, headers[sheet][row]) for name in order}
+    columns = {at: "t" if name == step else name for name, at in places.items() if at and at > 0}
+    steps = _steps(book.sheets[sheet], places[step], row, model.rows)
+    return Table(sheet, columns, steps, {k: r for r, k in steps.items()}, row)
 
 
-def _header(cells: dict[Cell, Content], row: int) -> dict[str, int]:
-    """Column by text, the first of equal ones, of one row."""
-    width = 2 * max((c for r, c in cells if r == row), default=0)
-    found: dict[str, int] = {}
-    for column in range(1, min(width, 2_000) + 1):
-        content = cells.get((row, column))
-        if type(content) is str:
-            found.setdefault(content, column)
-    return found
+def _headers(cells: dict[Cell, Content]) -> Rows:
+    """Column by text, the first of equal ones, of every row that holds texts."""
+    rows: Rows = {}
+    for (row, column), content in cells.items():
+        if type(content) is str and content:
+            header = rows.setdefault(row, {})
+            text = content.strip()
+            header[text] = min(column, header.get(text, column))
+    return rows
 
 
-def _steps(cells: dict[Cell, Content], column: int, header: int, rows: int) -> dict[int, int]:
+def _column_of(name: str, order: list[str], header: dict[str, int]) -> int | None:
+    """Where a column stands: below its symbol, or where that was, between its neighbours."""
+    if name in header:
+        return header[name]
+    at = order.index(name)
+    known = [(n, header[other] - n) for n, other in enumerate(order) if other in header]
+    left = [shift for n, shift in known if n < at][-1:]
+    right = [shift for n, shift in known if n > at][:1]
+    shifts = {*left, *right}
+    return at + shifts.pop() if len(shifts) == 1 else None
+
+
+def _steps(
+    cells: dict[Cell, Content], column: int | None, header: int, rows: int
+) -> dict[int, int]:
     """Step by row: below the header, where the index column counts 0, 1, 2, ..."""
     numbers = sorted((r, v) for (r, c), v in cells.items() if c == column and r > header)
     found: dict[int, int] = {}

@@ -27,11 +27,13 @@ LOOKS_RIGHT, NOT_YET = "looks right", "not yet"
 TOKEN_NAME = "kfsheet_token"
 HEADS = ("answer", "points", "where", "what to do", "filled in", "checksum", "right", "feedback")
 WIDTHS = {1: 14, 2: 8, 3: 22, 4: 70, 5: 10, 6: 12, 7: 10, 8: 14, 10: 12, 11: 12}
+CHARACTERS_A_LINE = 175  # of the columns A to H together, in a wide font
 HOW = (
     "Fill in the orange cells on the sheets named below: a formula in each, from top to bottom. "
     "Everything that follows from them is live, charts too. Helper cells may stand anywhere beside "
-    "the tables. A formula must follow when a parameter or a photo changes: type no number that "
-    "stands in a cell."
+    "the tables. A formula must follow when a parameter or a measurement changes: type no number "
+    'that stands in a cell. Where there is no value, a formula gives the empty text "", as the '
+    "others do; ISNUMBER tells whether there is one."
 )
 FEEDBACK = (
     "An answer that is right looks not yet so as long as one that it is computed from is wrong; "
@@ -102,9 +104,7 @@ def question_pages(
     page, hidden = Page(SHEET, widths=dict(WIDTHS)), Page(HIDDEN)
     page.put(1, 1, f"{exercise.title}: questions for {student[1]}", "title")
     for row, words in ((3, HOW), (4, FEEDBACK)):
-        page.put(row, 1, words, "text", align="wrap")
-        page.merges.append(f"A{row}:H{row}")
-        page.heights[row] = 36
+        _put_paragraph(page, row, words)
     for column, word in enumerate(HEADS, 1):
         page.put(FIRST - 1, column, word, "header", align="center")
     hidden.put(1, 1, tokens.token(secret, exercise.name, student[0]), "index")
@@ -123,9 +123,13 @@ def _put_task(page: Page, row: int, task: tuple[str, ...]) -> None:
     if task:
         page.put(row, 1, "What you need to know", "heading")
     for line, words in enumerate(task, row + 1):
-        page.put(line, 1, words, "text", align="wrap")
-        page.merges.append(f"A{line}:H{line}")
-        page.heights[line] = 18 * (1 + len(words) // 150)
+        _put_paragraph(page, line, words)
+
+
+def _put_paragraph(page: Page, row: int, words: str) -> None:
+    page.put(row, 1, words, "text", align="wrap")
+    page.merges.append(f"A{row}:H{row}")
+    page.heights[row] = 15 * (1 + len(words) // CHARACTERS_A_LINE) + 5
 
 
 def _put_question(

@@ -22,6 +22,7 @@ from defusedxml import DefusedXmlException, ElementTree
 
 from kfsheet.coursework.worksheet import LONGEST_TEXT, MOST_CELLS, Budget, Content, SheetReader
 from kfsheet.errors import SubmissionError
+from kfsheet.excel.package import relations
 from kfsheet.excel.references import Cell
 
 MEGABYTE = 2**20
@@ -166,16 +167,7 @@ class _Parts:
     def links(self, name: str) -> dict[str, tuple[str, str]]:
         """Target and type by relationship id; targets outside the file are left out."""
         folder, base = posixpath.split(name)
-        relations = self.tree(f"{folder}/_rels/{base}.rels")
-        return {
-            item.get("Id", ""): (_inside(folder, item.get("Target", "")), item.get("Type", ""))
-            for item in relations
-            if item.get("TargetMode") != "External"
-        }
-
-
-def _inside(folder: str, target: str) -> str:
-    return target[1:] if target.startswith("/") else posixpath.normpath(f"{folder}/{target}")
+        return relations(self.tree(f"{folder}/_rels/{base}.rels"), folder)
 
 
 def _all(root: Element, tag: str) -> list[Element]:

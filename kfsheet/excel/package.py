@@ -6,13 +6,14 @@ XML parser needs a second for what is a question of a tenth.
 
 from __future__ import annotations
 
+import posixpath
 import re
 import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from xml.etree.ElementTree import ParseError
+from xml.etree.ElementTree import Element, ParseError
 
 from defusedxml import ElementTree
 from openpyxl.utils import column_index_from_string, coordinate_to_tuple, get_column_letter
@@ -129,14 +130,25 @@ def strip_values(path: str | Path, copy: str | Path, changes: Changes | None = N
 
 def _parts(archive: zipfile.ZipFile) -> dict[str, str]:
     """Name inside the zip of every worksheet, by title."""
-    links = ElementTree.fromstring(archive.read("xl/_rels/workbook.xml.rels"))
-    targets = {link.get("Id"): link.get("Target", "") for link in links}
+    links = relations(ElementTree.fromstring(archive.read("xl/_rels/workbook.xml.rels")), "xl")
     sheets = ElementTree.fromstring(archive.read("xl/workbook.xml")).iter(f"{{{MAIN}}}sheet")
-    homes = {sheet.get("name"): targets[sheet.get(f"{{{LINKS}}}id")] for sheet in sheets}
+    return {sheet.get("name"): links[sheet.get(f"{{{LINKS}}}id")][0] for sheet in sheets}
+
+
+def relations(root: Element, folder: str) -> dict[str, tuple[str, str]]:
+    """Part and type by id, from the relations of a part that lies in ``folder``.
+
+    Targets outside the file are left out.
+    """
     return {
-        title: home.lstrip("/") if home.startswith("/") else f"xl/{home}"
-        for title, home in homes.items()
+        item.get("Id", ""): (_inside(folder, item.get("Target", "")), item.get("Type", ""))
+        for item in root
+        if item.get("TargetMode") != "External"
     }
+
+
+def _inside(folder: str, target: str) -> str:
+    return target[1:] if target.startswith("/") else posixpath.normpath(f"{folder}/{target}")
 
 
 def _stripped(xml: bytes) -> bytes:

@@ -101,8 +101,8 @@ def assemble(exercise: Exercise, layout: Layout, pages: list[Page], now: Run) ->
         _colour_verdict(book["Check"])
     if exercise.greyed:
         _grey_rows(book, layout, exercise.greyed)
-    if exercise.alarm:
-        _redden(book["Parameters"], layout, exercise.alarm)
+    for name in exercise.alarm:
+        _redden(book["Parameters"], layout, name)
     draw(book, exercise, layout)
     _describe(book, exercise)
     return book

@@ -158,3 +158,32 @@ QUESTIONS = (
     Question("x_a", 1, "The state after both observations."),
     Question("y_a", 1, "The state after both observations."),
 )
+TASK = (
+    "Step t is a sweep of the radar; dt is the time between two. The state is (x, vx, y, vy): "
+    "distance from the cannon, height, and their velocities. Names that end in _f are of the "
+    "forecast, in _1 of the state after the first observation, in _a of the analysis; d is an "
+    "innovation. P_xy_f is the covariance of x and y in the forecast, and so on.",
+    "Model. No drag: vx stays, vy falls at the rate g, x and y follow their velocities. A step dt "
+    "of this, solved exactly, leads from x_a, vx_a, y_a, vy_a of the sweep before to the "
+    "forecast. Sweep 0 has none before it: there x_f is x_true with the error e_x, y_f is y_true "
+    "with e_y, vy_f is vy_true with e_vy.",
+    "Radar. It stands at (x_R, y_R). It measures the range r, the length of the line to the ball, "
+    "and the angle theta of that line with the direction in which x grows: nearly pi at first, "
+    "when the ball is far on the left. The columns theta_obs and r_obs hold what it measured, "
+    "with standard deviations sigma_theta and sigma_r; nothing in sweep 0, nothing after the "
+    "landing.",
+    "Innovation. d_theta is theta_obs less the angle at which the radar would see the forecast; "
+    "it is brought into (-pi, pi], since full turns do not count. Without theta_obs it has no "
+    "value.",
+    "H. H_theta_x, H_theta_y, H_r_x and H_r_y are the derivatives of theta and r with respect to "
+    "x and y, taken at the forecast. Those with respect to velocities are 0. They have a value in "
+    "every sweep from 1 on, whether or not there is an echo.",
+    "The angle first. With H = (H_theta_x, 0, H_theta_y, 0) and the forecast's covariance P, of "
+    "which P_xx_f, P_xy_f and P_yy_f are all that you need: S_theta = H P H' + sigma_theta^2. The "
+    "gain K = P H' / S_theta has K_x_theta as its element for x and K_y_theta as that for y; both "
+    "are 0 where d_theta has no value. The covariance is now P - K S_theta K', with P_xx_1 as the "
+    "variance of x, and the state is x_1, y_1.",
+    "Then the range. The angle has moved the state, and d_r_left is what that left of the "
+    "innovation in r. Its gains are K_x_r and K_y_r. Without a range the analysis is x_1, y_1; in "
+    "sweep 0 it is the forecast.",
+)

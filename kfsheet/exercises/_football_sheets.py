@@ -107,15 +107,14 @@ QUESTIONS = (
 TASK = (
     "Step t is a photo; dt is the time between two. Distances x and heights z are in metres, "
     "pixels in px. A subscript f is the forecast, a the analysis, d an innovation.",
-    "Model. Mean velocities of the step that ends in photo t: u(t) = (x_a(t-1) - x_a(t-2))/dt "
-    "- f |u(t-1)| u(t-1) dt, and w(t) likewise from z_a, less g dt. In photo 0 they are u_0 and "
-    "w_0; in photo 1, which has no two analyses before it, u_0 and w_0 take the place of the "
-    "fraction.",
+    "Model. Mean velocities of the step that ends in photo t: u(t) = (x_a(t-1) - x_a(t-2))/dt - f "
+    "|u(t-1)| u(t-1) dt, and w(t) likewise from z_a, less g dt. In photo 0 they are u_0 and w_0; "
+    "in photo 1, which has no two analyses before it, u_0 and w_0 take the place of the fraction.",
     "Forecast. x_f(t) = x_a(t-1) + u(t) dt - h f |u(t)| u(t) dt^p, and z_f(t) likewise from w, "
     "less h g dt^2; in photo 0 they are x_0 and z_0. The switches h and p are parameters.",
-    "Camera. It sees i = a x and j = j_0 - a z, with variances r_i and r_j; the forecast errs with "
-    "variances b_x and b_z. So H is a for x and -a for z, B and R are diagonal, and an innovation "
-    "is the pixel seen less the pixel of the forecast. Without a photo there is no innovation, "
-    "and the analysis is the forecast.",
-    "Analysis. x_a = x_f + K d with the gain K = B H' (R + H B H')^-1, one for x, one for z.",
+    "Camera. It sees i = a x and j = j_0 - a z, with variances r_i and r_j; the forecast errs "
+    "with variances b_x and b_z. So H is a for x and -a for z, B and R are diagonal, and the "
+    "innovations d_i and d_j are the pixel seen less the pixel of the forecast. Without a photo "
+    "there is no innovation, and the analysis is the forecast.",
+    "Analysis. The gain is K = B H' (R + H B H')^-1: K_x takes d_i to x_a, K_z takes d_j to z_a.",
 )

@@ -14,7 +14,7 @@ from sympy import Expr, Matrix, Piecewise, Symbol, atan2, cos, diag, pi, sin, sq
 
 from kfsheet.algebra import discrete_noise, transition_matrix
 from kfsheet.exercise import Exercise
-from kfsheet.exercises._cannonball_sheets import ABOUT, CHARTS, QUESTIONS, SECTIONS
+from kfsheet.exercises._cannonball_sheets import ABOUT, CHARTS, QUESTIONS, SECTIONS, TASK
 from kfsheet.expressions import RMS, Last, Mean, Missing, Sum, t, when_observed
 from kfsheet.kalman import Observation, State, StateSpace, add_filter
 from kfsheet.recurrence import Recurrence
@@ -224,10 +224,11 @@ exercise = Exercise(
     source="I. Curnick, 'Kalman Filtering a Cannon Ball' (2025), after Zarchan and Musoff",
     charts=CHARTS,
     questions=QUESTIONS,
+    task=TASK,
     notebook="notebooks/02_cannonball.ipynb",
     sections=SECTIONS,
     greyed="in_flight",
-    alarm="landed",
+    alarm=("landed",),
     vary={
         "v_0": (850, 910),
         "angle": (40, 45),

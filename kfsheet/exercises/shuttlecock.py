@@ -243,6 +243,34 @@ QUESTIONS = (
     Question("t_fall_raw", 1, "From W back to seconds."),
     Question("x_fall_raw", 1, "The track at t_fall."),
 )
+TASK = (
+    "Step t is a frame; dt is the time between two, k_fit the drag over mass. Of the filter only "
+    "the height is asked: its state is z, its velocity vz and its acceleration az. Names that end "
+    "in _f are of the forecast, in _a of the analysis; d_z is an innovation; P_zvz_f is the "
+    "covariance of z and vz in the forecast. x and y go the same way, without gravity.",
+    "Forecast. Over the step from the frame before (z_a, vz_a, az_a) the acceleration counts as "
+    "constant; that gives z_f and vz_f. az_f is what acts at the new velocity: drag, which is "
+    "k_fit times the velocity, against it, and gravity g. In frame 0 z_f is z_obs.",
+    "Analysis. The cameras see the height itself, z_obs, with the variance r_obs: H = (1, 0, 0). "
+    "With the forecast's covariance P, whose first column is P_zz_f, P_zvz_f, P_zaz_f: S_z is the "
+    "variance H P H' + r_obs, K = P H' / S_z the gain with the elements K_z_z and K_vz_z. The "
+    "analysis z_a moves by gain times innovation, and K S_z K' is taken away from P; P_zz_a is "
+    "what is left of its first element. Frame 0 has no innovation: its analysis is the forecast, "
+    "the variance too.",
+    "Track. With linear drag, in the distorted time X = (1 - exp(-k_fit time))/k_fit of the sheet "
+    "Fit raw, x is the straight line p_x_raw + v_x_raw X, and z is p_z_raw + v_z_raw X + drop. "
+    "drop is the height of a thing let go at height 0 at time 0 (column time), under g and the "
+    "same drag: its velocity is -g X. X itself grows at the rate exp(-k_fit time) = 1 - k_fit X.",
+    "Fit. The line p_z_raw + v_z_raw X through the n = t + 1 heights z_obs - drop of the frames 0 "
+    "to t (the column frame) by least squares, from frame 1 on. Its normal equations hold n and "
+    "the sums over these frames that stand beside it: sum_X, sum_XX (of X^2), sum_z_raw (of the "
+    "heights), sum_Xz_raw (of X times the heights).",
+    "Fall. The track comes down to z_fall at the time t_fall_raw = (c + W)/k_fit, with c_raw for "
+    "c and W for the root of f(W) = w exp(-W) - W, w_raw for w. W_0_raw is a first guess, W_1_raw "
+    "to W_4_raw are a step of Newton's method each, and W_4_raw counts as W. x_fall_raw is where "
+    "the track then is. A track that stays below z_fall has no first guess, and then the rest of "
+    "the row has no value either.",
+)
 ASKED_OF_Z = (
     *("z_f", "vz_f", "az_f", "d_z", "S_z", "K_z_z", "K_vz_z", "z_a", "P_zz_a"),
     *("p_z_raw", "v_z_raw"),
@@ -260,6 +288,7 @@ exercise = Exercise(
     "IEEE ROBIO (2009)",
     charts=CHARTS,
     questions=QUESTIONS,
+    task=TASK,
     notebook="notebooks/03_shuttlecock.ipynb",
     sections=SECTIONS,
     vary={"v_x": (1.2, 1.8), "v_y": (0.6, 1.0), "v_z": (3.7, 4.2), "k_m": (0.85, 1.15)},
