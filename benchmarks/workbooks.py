@@ -13,8 +13,8 @@ import openpyxl
 from measuring import Line, seconds
 
 import kfsheet as kf
-from kfsheet.excel.package import strip_values
 from kfsheet.excel.recalculate import convert, libreoffice, recalculate
+from kfsheet.excel.stripping import strip_values
 from kfsheet.excel.workbook import workbook_bytes
 from kfsheet.exercises.cannonball import exercise as cannonball
 from kfsheet.exercises.football import exercise as football

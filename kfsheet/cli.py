@@ -145,14 +145,16 @@ def run_check(arguments: argparse.Namespace) -> int:
 
 
 def _check_one(path: Path, arguments: argparse.Namespace) -> int:
-    from kfsheet.excel.recalculate import Ahead
+    from kfsheet.excel.engine import Apart
 
-    engine = Ahead(path, arguments.engine)  # it works while SymPy is imported
+    asked = Apart(path) if arguments.engine == "ironcalc" else None
+    if asked:
+        asked.ask()  # it works while SymPy is imported
     from kfsheet.excel.check import check
     from kfsheet.excel.reading import Opened
     from kfsheet.exercises import exercise_names, load_exercise
 
-    book = Opened(engine)
+    book = Opened(path, arguments.engine, asked)
     name = book.exercise_name()
     exercise = load_exercise(arguments.exercise) if arguments.exercise else None
     if exercise is None and name not in exercise_names():

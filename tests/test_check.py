@@ -7,7 +7,7 @@ import pytest
 
 from kfsheet import DataError, EngineError, WorkbookError, check_workbook, recalculate
 from kfsheet.excel.reading import Opened
-from kfsheet.excel.recalculate import Ahead, open_workbook
+from kfsheet.excel.recalculate import open_workbook
 from kfsheet.exercises.football import exercise
 
 
@@ -251,7 +251,7 @@ def test_what_is_no_workbook_and_what_is_not_ours_is_refused(tmp_path):
     foreign = tmp_path / "foreign.xlsx"
     openpyxl.Workbook().save(foreign)
     with pytest.raises(WorkbookError, match="not one of ours"):
-        Opened(Ahead(foreign)).exercise_name()
+        Opened(foreign).exercise_name()
 
 
 def test_an_unknown_engine_is_refused(football_file):

@@ -14,9 +14,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from kfsheet.errors import EngineError, KfsheetError
-from kfsheet.excel.package import Changes
-from kfsheet.excel.recalculate import CellValue, open_in
+from kfsheet.excel.engine import CellValue
+from kfsheet.excel.recalculate import open_in
 from kfsheet.excel.references import Address
+from kfsheet.excel.stripping import Changes
 
 
 def calculated(

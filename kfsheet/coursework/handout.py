@@ -31,9 +31,10 @@ from kfsheet.coursework.workers import Failed, Pool
 from kfsheet.coursework.worlds import Own
 from kfsheet.errors import ModelError, WorkbookError
 from kfsheet.excel.compose import Run
+from kfsheet.excel.engine import Values
 from kfsheet.excel.layout import FIRST_ROW, Layout
 from kfsheet.excel.page import Page, Piece, is_formula
-from kfsheet.excel.recalculate import Values, recalculate
+from kfsheet.excel.recalculate import recalculate
 from kfsheet.excel.styles import LEGEND
 from kfsheet.excel.workbook import Shell, assemble, built_bytes, compose
 from kfsheet.exercise import Exercise

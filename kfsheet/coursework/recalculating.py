@@ -18,8 +18,8 @@ from kfsheet.coursework.judge import asked_steps
 from kfsheet.coursework.places import Places
 from kfsheet.coursework.worlds import ALONE, Scene, World
 from kfsheet.errors import KfsheetError
-from kfsheet.excel.package import Changes
-from kfsheet.excel.recalculate import CellValue
+from kfsheet.excel.engine import CellValue
+from kfsheet.excel.stripping import Changes
 
 RUNS = (0, 2, 4, 6, 1, 3)
 """Numbers of the worlds: four near the model's own run, two anywhere."""

@@ -22,7 +22,7 @@ from defusedxml import DefusedXmlException, ElementTree
 
 from kfsheet.coursework.worksheet import LONGEST_TEXT, MOST_CELLS, Budget, Content, SheetReader
 from kfsheet.errors import SubmissionError
-from kfsheet.excel.package import relations
+from kfsheet.excel.archive import relations
 from kfsheet.excel.references import Cell
 
 MEGABYTE = 2**20

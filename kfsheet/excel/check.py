@@ -20,10 +20,10 @@ from pathlib import Path
 from kfsheet.errors import DataError
 from kfsheet.excel.compare import Comparison
 from kfsheet.excel.compose import Run
-from kfsheet.excel.package import Changes
+from kfsheet.excel.engine import Values
 from kfsheet.excel.reading import Inputs, Opened, layout_of, place
-from kfsheet.excel.recalculate import Ahead, Values
 from kfsheet.excel.references import Address
+from kfsheet.excel.stripping import Changes
 from kfsheet.exercise import Exercise
 
 TOLERANCES = {"ironcalc": 1e-12, "libreoffice": 1e-11}
@@ -106,7 +106,7 @@ def check_workbook(path: str | Path, exercise: Exercise, engine: str = "ironcalc
     EngineError
         If the engine cannot do its work.
     """
-    return check(Opened(Ahead(path, engine)), exercise)
+    return check(Opened(path, engine), exercise)
 
 
 def check(book: Opened, exercise: Exercise) -> Report:
@@ -114,29 +114,25 @@ def check(book: Opened, exercise: Exercise) -> Report:
     built = Run.of(exercise.model)
     layout = layout_of(book, exercise)
     inputs = Inputs(book, layout)
-    changed, engine = list(_changed(inputs, built)), book.engine.name
-    # The engine calculates the next ones while the first are compared.
-    trials = [(book.engine.ask(trial[0]), words, *trial[1:]) for words, trial in _trials(inputs)]
+    changed = list(_changed(inputs, built))
 
     def compare(values: Values, now: Run) -> Comparison:
-        comparison = Comparison(book, layout, values, TOLERANCES[engine])
+        comparison = Comparison(book, layout, values, TOLERANCES[book.engine_name])
         comparison.run(exercise, now, built)
         return comparison
 
-    as_it_stands = Run.of(exercise.model, inputs.data, inputs.parameters) if changed else built
-    first = compare(book.values, as_it_stands)
+    now = Run.of(exercise.model, inputs.data, inputs.parameters) if changed else built
+    trials = _answered(book, inputs, now)
+    _, *as_it_stands = next(trials)
+    first = compare(*as_it_stands)
     found, differing = first.problems, set(first.differing)
-    for values, words, data, parameters in trials:
-        try:
-            now = Run.of(exercise.model, data, parameters)
-        except DataError:
-            continue  # the model has no value there; the other comparisons have to do
-        trial = compare(values.result(), now)
+    for words, *other in trials:
+        trial = compare(*other)
         told = {address: f"{reason} ({words})" for address, reason in trial.problems.items()}
         found, differing = {**told, **found}, differing | set(trial.differing)
     return Report(
         book.path,
-        engine,
+        book.engine_name,
         first.cells,
         first.largest,
         changed,
@@ -164,6 +160,23 @@ def _changed(inputs: Inputs, built: Run) -> Iterator[str]:
         before = [None if math.isnan(value) else value for value in built.columns[name]]
         if count := sum(a != b for a, b in zip(series, before, strict=True)):
             yield f"{count} value{'s' * (count > 1)} of {name}"
+
+
+def _answered(book: Opened, inputs: Inputs, now: Run) -> Iterator[tuple[str, Values, Run]]:
+    """What the engine and NumPy find, as the file stands and then with other inputs.
+
+    While the caller compares, the engine works on the next ones.
+    """
+    words, values = "", book.values
+    for change, (changes, data, parameters) in _trials(inputs):
+        try:
+            other = Run.of(inputs.layout.model, data, parameters)
+        except DataError:
+            continue  # the model has no value there; the other comparisons have to do
+        book.engine.ask(changes)
+        yield words, values, now
+        words, values, now = change, book.engine.answer(), other
+    yield words, values, now
 
 
 def _trials(inputs: Inputs) -> Iterator[tuple[str, tuple[Changes, Data, dict[str, float]]]]:

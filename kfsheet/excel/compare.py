@@ -32,10 +32,10 @@ from kfsheet.excel.compose import (
     parameters_page,
     section_page,
 )
+from kfsheet.excel.engine import Values
 from kfsheet.excel.layout import FIRST_ROW, Layout
 from kfsheet.excel.page import Filled, Page, Piece, is_formula
 from kfsheet.excel.reading import Opened
-from kfsheet.excel.recalculate import Values
 from kfsheet.excel.references import Address
 from kfsheet.exercise import Exercise
 from kfsheet.expressions import lag, t

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 from openpyxl import Workbook
 from openpyxl.utils import get_column_letter
 
 from kfsheet.errors import DataError, WorkbookError
+from kfsheet.excel.engine import CellValue, Values
 from kfsheet.excel.layout import FIRST_ROW, SYMBOL_ROW, Layout, quote
 from kfsheet.excel.package import Package
-from kfsheet.excel.recalculate import Ahead, CellValue, Values, open_workbook
+from kfsheet.excel.recalculate import Asked, ask_about, open_workbook
 from kfsheet.excel.references import Address
 from kfsheet.exercise import Exercise
 from kfsheet.recurrence import Recurrence
@@ -22,15 +24,19 @@ EXERCISE_NAME = "kfsheet_exercise"
 class Opened:
     """A workbook as it stands: its names and formula cells, and the values an engine finds."""
 
-    def __init__(self, engine: Ahead) -> None:
-        self.path, self.engine = engine.path, engine
-        self.package = Package(engine.path)
+    def __init__(
+        self, path: str | Path, engine: str = "ironcalc", asked: Asked | None = None
+    ) -> None:
+        """``asked`` is the engine, if it was asked about the file before."""
+        self.path, self.engine_name = Path(path), engine
+        self.engine = asked or ask_about(path, engine)
+        self.package = Package(path)
         self._formulas = {title: self.package.formulas(title) for title in self.package.titles}
 
     @cached_property
     def values(self) -> Values:
-        """What the engine finds."""
-        return self.engine.values
+        """What the engine finds in the file as it stands."""
+        return self.engine.answer()
 
     def value(self, address: Address) -> CellValue:
         """What the engine found in a cell."""

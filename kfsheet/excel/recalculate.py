@@ -12,8 +12,6 @@ import tempfile
 import warnings
 import zipfile
 import zlib
-from concurrent.futures import Future, ThreadPoolExecutor
-from itertools import starmap
 from pathlib import Path
 from typing import Protocol
 from xml.etree.ElementTree import ParseError
@@ -22,11 +20,8 @@ import openpyxl
 from openpyxl.utils.exceptions import InvalidFileException
 
 from kfsheet.errors import EngineError, WorkbookError
-from kfsheet.excel.package import Changes, strip_values
-
-CellValue = float | int | str | bool | None
-Values = dict[str, dict[tuple[int, int], CellValue]]
-"""Value by sheet and (row, column), counted from 1; errors are strings such as '#DIV/0!'."""
+from kfsheet.excel.engine import Apart, IronCalc, Values
+from kfsheet.excel.stripping import Changes, strip_values
 
 TIMEOUT = 300  # seconds, for LibreOffice
 # Where installers put it on macOS and Windows without a word to PATH.
@@ -41,6 +36,18 @@ class Engine(Protocol):
 
     def values(self, changes: Changes | None = None) -> Values:
         """Values of all cells that are not empty, with numbers put in first."""
+        ...
+
+
+class Asked(Protocol):
+    """A workbook in an engine that is asked first and answers later, one question at a time."""
+
+    def ask(self, changes: Changes | None = None) -> None:
+        """Calculate, with numbers put in first."""
+        ...
+
+    def answer(self) -> Values:
+        """Values of all cells that are not empty."""
         ...
 
 
@@ -80,6 +87,16 @@ def open_in(path: str | Path, engine: str = "ironcalc") -> Engine:
     return ENGINES[engine](Path(path))
 
 
+def ask_about(path: str | Path, engine: str = "ironcalc") -> Asked:
+    """An engine that is asked about a file as it stands; see :func:`recalculate`.
+
+    IronCalc works in a process of its own meanwhile, LibreOffice once the answer is wanted.
+    """
+    asked = Apart(path) if engine == "ironcalc" else open_in(path, engine)
+    asked.ask()
+    return asked
+
+
 def open_workbook(path: str | Path, *, data_only: bool = False) -> openpyxl.Workbook:
     """Open an ``.xlsx`` file, or say in one line why it is none."""
     try:
@@ -104,89 +121,6 @@ def open_workbook(path: str | Path, *, data_only: bool = False) -> openpyxl.Work
         raise WorkbookError(f"{path} is not a workbook (.xlsx): {detail}") from None
 
 
-class Ahead:
-    """A workbook in an engine that works in a thread of its own, in the order it is asked.
-
-    IronCalc lets go of Python's lock while it loads and calculates, so it costs no time that can be
-    filled otherwise. Errors come with the values.
-    """
-
-    def __init__(self, path: str | Path, engine: str = "ironcalc") -> None:
-        self.path, self.name = Path(path), engine
-        self._pool = ThreadPoolExecutor(1)
-        self._opened = self._pool.submit(open_in, path, engine)
-        self._stands = self.ask(None)
-
-    @property
-    def values(self) -> Values:
-        """What the engine finds in the workbook as it stands."""
-        return self._stands.result()
-
-    def ask(self, changes: Changes | None) -> Future[Values]:
-        """What it finds with numbers put in first; see :func:`recalculate`."""
-        return self._pool.submit(lambda: self._opened.result().values(changes))
-
-
-class IronCalc:
-    """A workbook in IronCalc: loaded once, calculated as often as inputs change."""
-
-    def __init__(self, path: Path) -> None:
-        import ironcalc
-
-        with tempfile.TemporaryDirectory(prefix="kfsheet-") as folder:
-            copy = Path(folder) / "copy.xlsx"
-            strip_values(path, copy)
-            try:
-                self._model = ironcalc.load_from_xlsx(str(copy), "en", "UTC")
-            except Exception as error:  # its own kind and, from Rust, PanicException
-                raise EngineError(f"IronCalc cannot read the workbook: {error}") from None
-        self._sheets = [sheet["name"] for sheet in self._model.get_worksheets_properties()]
-        self._before: dict[tuple[int, int, int], CellValue] = {}
-
-    def values(self, changes: Changes | None = None) -> Values:
-        """Values of all cells that are not empty, with numbers put in first."""
-        self._restore()
-        for sheet, cells in (changes or {}).items():
-            number = self._sheets.index(sheet)
-            for (row, column), value in cells.items():
-                self._put(number, row, column, value)
-        try:
-            self._model.evaluate()
-        except Exception as error:
-            raise EngineError(f"IronCalc cannot calculate the workbook: {error}") from None
-        found: list[dict[tuple[int, int], CellValue]] = [{} for _ in self._sheets]
-        cells = self._model.get_all_cells()
-        values = starmap(self._model.get_cell_value, cells)
-        for (sheet, row, column), value in zip(cells, values, strict=True):
-            if value is not None:
-                found[sheet][row, column] = value
-        return dict(zip(self._sheets, found, strict=True))
-
-    def _put(self, sheet: int, row: int, column: int, value: float | None) -> None:
-        place = sheet, row, column
-        formula = self._model.get_cell_formula(*place)
-        self._before[place] = formula or self._model.get_cell_value(*place)
-        self._write(place, value)
-
-    def _write(self, place: tuple[int, int, int], content: CellValue) -> None:
-        if content is None:
-            self._model.clear_cell_contents(*place)
-        elif isinstance(content, bool):
-            self._model.update_cell_with_bool(*place, content)
-        elif isinstance(content, int | float):
-            self._model.update_cell_with_number(*place, content)
-        elif content.startswith("="):
-            self._model.update_cell_with_formula(*place, content)
-        else:
-            self._model.update_cell_with_text(*place, content)
-
-    def _restore(self) -> None:
-        """Take the last changes back."""
-        for place, content in self._before.items():
-            self._write(place, content)
-        self._before.clear()
-
-
 def libreoffice() -> str | None:
     """Path of LibreOffice's command, if it is installed."""
     on_path = shutil.which("soffice") or shutil.which("libreoffice")
@@ -198,6 +132,15 @@ class LibreOffice:
 
     def __init__(self, path: Path) -> None:
         self._path = path
+        self._asked: Changes | None = None
+
+    def ask(self, changes: Changes | None = None) -> None:
+        """What :meth:`answer` will calculate."""
+        self._asked = changes
+
+    def answer(self) -> Values:
+        """Values of all cells, with the numbers asked for."""
+        return self.values(self._asked)
 
     def values(self, changes: Changes | None = None) -> Values:
         """Values of all cells that are not empty, with numbers put in first."""

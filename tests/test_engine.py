@@ -1,0 +1,43 @@
+"""IronCalc in a process of its own answers like IronCalc in this one, and may fail."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kfsheet import EngineError, WorkbookError
+from kfsheet.excel.engine import Apart, IronCalc
+
+FOOTBALL = Path("workbooks/football.xlsx")
+KICK = {"Parameters": {(5, 2): np.float64(25.0)}}
+
+
+def test_a_process_of_its_own_finds_what_this_one_finds_with_other_numbers_too():
+    here, apart = IronCalc(FOOTBALL), Apart(FOOTBALL)
+    for changes in (None, KICK, None):
+        apart.ask(changes)
+        assert apart.answer() == here.values(changes)
+
+
+def test_an_engine_that_ends_is_an_error_in_one_line():
+    apart = Apart(FOOTBALL)
+    apart._process.kill()
+    apart.ask()
+    with pytest.raises(EngineError, match="ended while it calculated"):
+        apart.answer()
+
+
+def test_what_cannot_be_read_is_said_by_the_process_too(tmp_path):
+    path = tmp_path / "a.xlsx"
+    path.write_bytes(b"no workbook")
+    apart = Apart(path)
+    apart.ask()
+    with pytest.raises(WorkbookError, match="is not a workbook"):
+        apart.answer()
+
+
+def test_an_engine_that_is_no_longer_wanted_leaves_no_process():
+    apart = Apart(FOOTBALL)
+    process = apart._process
+    del apart
+    assert process.poll() is not None
