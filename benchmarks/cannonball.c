@@ -14,9 +14,11 @@ static void observe(double x[4], double P[4][4], const double h[4], double r, do
     double Ph[4], S = r;
     for (int i = 0; i < 4; i++) Ph[i] = P[i][0] * h[0] + P[i][2] * h[2];
     S += h[0] * Ph[0] + h[2] * Ph[2];
-    for (int i = 0; i < 4; i++) x[i] += Ph[i] / S * d;
-    for (int i = 0; i < 4; i++)
-        for (int j = 0; j < 4; j++) P[i][j] -= Ph[i] * Ph[j] / S;
+    for (int i = 0; i < 4; i++) {
+        double K = Ph[i] / S;
+        x[i] += K * d;
+        for (int j = 0; j < 4; j++) P[i][j] -= K * Ph[j];
+    }
     *nis += d * d / S;
 }
 

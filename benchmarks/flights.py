@@ -2,11 +2,11 @@
 
 import ctypes
 import math
-import os
 import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -75,18 +75,23 @@ def numpy_loop(observed: np.ndarray) -> np.ndarray:
     return np.array(found)
 
 
+def c_compiler() -> str | None:
+    """Path of a C compiler."""
+    return next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
+
+
+@cache
 def c_library() -> ctypes.CDLL | None:
     """The hand-written loops, compiled; None without a C compiler."""
-    compiler = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
+    compiler = c_compiler()
     if compiler is None:
         return None
-    target = Path(tempfile.gettempdir()) / f"kfsheet-bench-{os.getpid()}.so"
-    if not target.exists():
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        target = str(Path(folder) / "cannonball.so")
         flags = ["-O3", "-march=native", "-fopenmp", "-shared", "-fPIC"]
-        subprocess.run(
-            [compiler, *flags, "-o", str(target), str(HERE / "cannonball.c"), "-lm"], check=True
-        )
-    return ctypes.CDLL(str(target))
+        source = str(HERE / "cannonball.c")
+        subprocess.run([compiler, *flags, "-o", target, source, "-lm"], check=True)
+        return ctypes.CDLL(target)
 
 
 def pointer(array: np.ndarray) -> ctypes.c_void_p:

@@ -5,7 +5,7 @@ from importlib.util import find_spec
 
 import numpy as np
 from flights import ROWS, STATE, c_library, pointer
-from measuring import Line, seconds
+from measuring import Line, in_turn, peak_memory, seconds
 from one_run import AXIS, Axis
 
 import kfsheet as kf
@@ -19,6 +19,7 @@ MEMBERS = 10_000
 def lines() -> Iterator[Line]:
     """All cores on our side, statistics of every step over the members on both."""
     yield cannonballs()
+    yield from drawn()
     yield footballs()
     if find_spec("simdkalman"):
         yield shuttlecocks()
@@ -34,21 +35,56 @@ def cannonballs() -> Line:
         return kf.evaluate(cannonball, data, members=MEMBERS, columns=wanted, scalars=())
 
     study = ours()
-    fast = seconds(ours, repeats=3)
     c = c_library()
     if c is None:
-        return Line("10,000 cannon-balls", fast)
+        return Line("10,000 cannon-balls", seconds(ours, repeats=3))
     sums = np.zeros((5, ROWS))
 
     def by_c() -> None:
         sums[:] = 0
         c.many(MEMBERS, ROWS, *map(pointer, draws), pointer(sums))
 
-    peer = seconds(by_c, repeats=3)
+    by_c()
     for name, total in zip(wanted, sums, strict=True):
         mean = study.rows[name]["mean"].fillna(0)
         assert np.allclose(mean, total / MEMBERS, rtol=1e-6, atol=1e-3)
-    return Line("10,000 cannon-balls: C by hand, OpenMP", fast, peer, "0.5 (within 2 of C)")
+    times = in_turn(ours, by_c, repeats=5)
+    return Line("10,000 cannon-balls: C by hand, OpenMP", *times, "0.5 (within 2 of C)")
+
+
+def drawn() -> Iterator[Line]:
+    """The same with draws of our own, and with all that a study can be asked for."""
+    four = kf.NEES(("x", "vx", "y", "vy"))
+
+    def draws(**more: object) -> None:
+        kf.evaluate(
+            cannonball,
+            kf.Draws("n_theta", "n_r", seed=1),
+            members=MEMBERS,
+            columns=[*STATE, "NIS"],
+            **more,
+        )
+
+    everything = {"nees": {"NEES": four}, "quantiles": [0.05, 0.5, 0.95]}
+    draws(scalars=())
+    yield Line("the same, draws included", seconds(lambda: draws(scalars=()), repeats=3))
+    draws(**everything)
+    yield Line(
+        "the same, with NEES, all scalars and three quantiles",
+        seconds(lambda: draws(**everything), repeats=3),
+        0,
+        f"at most {peak_memory(EVERYTHING):.0f} MB (under 500)",
+    )
+
+
+EVERYTHING = f"""
+import kfsheet as kf
+from kfsheet.exercises.cannonball import cannonball
+kf.evaluate(
+    cannonball, kf.Draws("n_theta", "n_r"), members={MEMBERS}, columns=["NIS"],
+    nees={{"NEES": kf.NEES(("x", "vx", "y", "vy"))}}, quantiles=[0.05, 0.5, 0.95],
+)
+"""
 
 
 def footballs() -> Line:
@@ -65,7 +101,7 @@ def footballs() -> Line:
     for name, table in theirs.items():
         for statistic, values in table.items():
             assert np.allclose(study.rows[name][statistic], values, rtol=1e-9, atol=1e-9)
-    times = seconds(ours, repeats=15), seconds(lambda: vectorised_football(photos), repeats=15)
+    times = in_turn(ours, lambda: vectorised_football(photos), repeats=25)
     return Line("10,000 footballs: vectorised NumPy", *times, "1")
 
 
@@ -96,7 +132,8 @@ def shuttlecocks() -> Line:
     study = ours()
     means = np.column_stack([study.rows[name]["mean"][1:] for name in AXIS])
     assert np.allclose(means, theirs(), rtol=1e-9, atol=1e-9)
-    return Line("10,000 shuttlecocks, one axis: simdkalman", seconds(ours), seconds(theirs), "1")
+    words = "1; it stores every state and covariance"
+    return Line("10,000 shuttlecocks, one axis: simdkalman", *in_turn(ours, theirs), words)
 
 
 def vectorised_football(i: np.ndarray) -> dict[str, dict[str, np.ndarray]]:

@@ -1,7 +1,9 @@
 """Times, as medians, and the lines of the table."""
 
+import subprocess
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from statistics import median
 from typing import NamedTuple
 
@@ -15,12 +17,36 @@ class Line(NamedTuple):
     note: str = ""
 
 
+def in_turn(
+    *works: Callable[[], object], repeats: int = 5, calls: Sequence[int] = ()
+) -> list[float]:
+    """Median time of a call of each, in seconds; all of them are repeated one after the other.
+
+    So a machine that is busy for a while slows all of them. ``calls`` says how often each is called
+    in a repeat, once by default.
+    """
+    times: list[list[float]] = [[] for _ in works]
+    for _ in range(repeats):
+        for work, count, found in zip(works, calls or [1] * len(works), times, strict=True):
+            start = time.perf_counter()
+            for _ in range(count):
+                work()
+            found.append((time.perf_counter() - start) / count)
+    return [median(found) for found in times]
+
+
 def seconds(work: Callable[[], object], repeats: int = 5, calls: int = 1) -> float:
     """Median time of a call, in seconds."""
-    times = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        for _ in range(calls):
-            work()
-        times.append((time.perf_counter() - start) / calls)
-    return median(times)
+    return in_turn(work, repeats=repeats, calls=[calls])[0]
+
+
+def peak_memory(program: str) -> float:
+    """Megabytes that a program takes at most, in a process of its own."""
+    ending = (
+        "\nimport resource, sys\n"
+        "unit = 2**20 if sys.platform == 'darwin' else 2**10\n"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit)\n"
+    )
+    command = [sys.executable, "-c", program + ending]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return float(done.stdout.split()[-1])

@@ -11,7 +11,7 @@ from importlib.util import find_spec
 import flights
 import numpy as np
 from flights import STATE
-from measuring import Line, seconds
+from measuring import Line, in_turn
 
 import kfsheet as kf
 from kfsheet import evaluation
@@ -40,16 +40,23 @@ def extended() -> Iterator[Line]:
         return flights.filterpy_loop(observed)
 
     assert np.allclose(theirs(), frame[STATE], rtol=1e-6, atol=1e-3)
-    fast = seconds(ours, calls=50)
-    yield Line("one EKF, 1,320 steps: filterpy", fast, seconds(theirs), "100")
-    yield Line("one EKF: NumPy by hand", fast, seconds(lambda: flights.numpy_loop(observed)))
-    if by_c := flights.one_by_c(frame):
-        yield Line("one EKF: C by hand", fast, seconds(by_c, calls=50), "0.67 (within 1.5 of C)")
+
+    def by_hand() -> object:
+        return flights.numpy_loop(observed)
+
+    by_c = flights.one_by_c(frame)
+    works = [ours, theirs, by_hand, *([by_c] if by_c else [])]
+    fast, *times = in_turn(*works, calls=[50, 1, 1, 50][: len(works)])
+    yield Line("one EKF, 1,320 steps: filterpy", fast, times[0], "100")
+    yield Line("one EKF: NumPy by hand", fast, times[1])
+    if by_c:
+        yield Line("one EKF: C by hand", fast, times[2], "0.67 (within 1.5 of C)")
     with without_compiler():
         ours()
-        slow = seconds(ours)
-    yield Line("one EKF without a compiler: filterpy", slow, seconds(theirs), "2")
-    yield Line("compile the model, once", compile_time(), 0, "then kept on disk")
+        yield Line("one EKF without a compiler: filterpy", *in_turn(ours, theirs), "2")
+    words = "in the background, then kept on disk"
+    yield Line("compile four columns of the model", compile_time(STATE), 0, words)
+    yield Line("compile all of its columns", compile_time(None), 0, words)
 
 
 def linear() -> Line:
@@ -72,8 +79,8 @@ def linear() -> Line:
     peer.initialize_known(start, P)
     assert np.allclose(peer.filter().filtered_state.T, frame[wanted], rtol=1e-6, atol=1e-3)
     kf.warm_up(cannonball, wanted)
-    ours = seconds(lambda: kf.evaluate(cannonball, columns=wanted), calls=50)
-    return Line("one linear filter, 1,320 steps: statsmodels", ours, seconds(peer.filter))
+    times = in_turn(lambda: kf.evaluate(cannonball, columns=wanted), peer.filter, calls=[50, 1])
+    return Line("one linear filter, 1,320 steps: statsmodels", *times)
 
 
 def short() -> Line:
@@ -86,9 +93,10 @@ def short() -> Line:
     seen = frame["x_obs"].to_numpy()[1:]
     assert np.allclose(peer.filter(seen)[0], frame[AXIS][1:], rtol=1e-9, atol=1e-9)
     kf.warm_up(shuttlecock, AXIS)
-    ours = seconds(lambda: kf.evaluate(shuttlecock, columns=AXIS), calls=50)
-    theirs = seconds(lambda: peer.filter(seen))
-    return Line("one axis of the shuttlecock, 27 frames: pykalman", ours, theirs)
+    times = in_turn(
+        lambda: kf.evaluate(shuttlecock, columns=AXIS), lambda: peer.filter(seen), calls=[50, 1]
+    )
+    return Line("one axis of the shuttlecock, 27 frames: pykalman", *times)
 
 
 AXIS = ["x_a", "vx_a", "ax_a"]
@@ -122,13 +130,13 @@ def without_compiler() -> Iterator[None]:
         evaluation.can_compile = can
 
 
-def compile_time() -> float:
-    """What the first run in class waits for, at most."""
+def compile_time(columns: list[str] | None) -> float:
+    """Seconds of compiling a kernel with an empty cache, in a process of its own."""
     program = (
         "import time, kfsheet as kf\n"
         "from kfsheet.exercises.cannonball import cannonball as m\n"
         "kf.evaluate(m); t = time.perf_counter()\n"
-        f"kf.warm_up(m, {STATE}); print(time.perf_counter() - t)"
+        f"kf.warm_up(m, {columns}); print(time.perf_counter() - t)"
     )
     with tempfile.TemporaryDirectory() as cache:
         environment = {**os.environ, "KFSHEET_CACHE": cache}

@@ -8,7 +8,7 @@ import pytest
 from kfsheet import EngineError, WorkbookError
 from kfsheet.excel.engine import Apart, IronCalc
 
-FOOTBALL = Path("workbooks/football.xlsx")
+FOOTBALL = Path(__file__).parents[1] / "workbooks" / "football.xlsx"
 KICK = {"Parameters": {(5, 2): np.float64(25.0)}}
 
 
