@@ -19,7 +19,7 @@ from kfsheet.errors import DataError, ModelError
 from kfsheet.expressions import Aggregate, ColumnBase, Last, Missing, column_references, lag, t
 from kfsheet.names import excel_name_problem, name_problem, section_problem
 from kfsheet.parts import Column, Parameter, Scalar, checked_values
-from kfsheet.schedule import Pass, schedule
+from kfsheet.schedule import Pass, refuse_circle, schedule
 from kfsheet.units import UnitProblem, UnitWalker, parse_unit
 
 
@@ -291,9 +291,10 @@ class Recurrence:
 
     def column(self, name: str) -> Column:
         """A column or the clock, by name."""
-        for column in self.all_columns():
-            if column.name == name:
-                return column
+        if name in self.table:
+            return self.table[name]
+        if self.clock and self.clock.name == name:
+            return self.clock
         raise ModelError(f"{self.name} has no column {name!r}; it has {', '.join(self.table)}")
 
     def units(self) -> dict[str, str]:
@@ -434,7 +435,7 @@ class Recurrence:
             self._check_observed(new)
             # Only a column that something reads already, or a summary's reader, closes a circle.
             if readers or new.name in reads or symbols & set(self.summaries):
-                schedule(self)
+                refuse_circle(self, new)
             for name in readers & set(self.table):
                 self._check_observed(self.table[name])
         except ModelError:

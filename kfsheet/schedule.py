@@ -45,6 +45,29 @@ def schedule(model: Recurrence) -> list[Pass]:
     return [p for p in passes if p.rows[0] or p.summaries]
 
 
+def refuse_circle(model: Recurrence, new: Column) -> None:
+    """Raise ModelError if a column that was just defined closes a circle.
+
+    Where no summary joins rows, a circle is one within a row, and only the cells that the new one
+    waits for need a look; the whole order is found only to say which circle it is.
+    """
+    if model.summaries or _waits_for_itself(model, new.name):
+        schedule(model)
+
+
+def _waits_for_itself(model: Recurrence, name: str) -> bool:
+    seen: set[str] = set()
+    todo = [name]
+    while todo:
+        rules = model.column(todo.pop()).rules
+        waits_for = {other for rule in rules for other in same_row(rule)}
+        if name in waits_for:
+            return True
+        todo += waits_for - seen
+        seen |= waits_for
+    return False
+
+
 def _levels(model: Recurrence) -> dict[str, int]:
     """Pass in which a column is computed; a summary stands one level above its columns."""
     columns, summaries = model.all_columns(), model.summaries
