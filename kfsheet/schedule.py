@@ -48,14 +48,16 @@ def schedule(model: Recurrence) -> list[Pass]:
 def refuse_circle(model: Recurrence, new: Column) -> None:
     """Raise ModelError if a column that was just defined closes a circle.
 
-    Where no summary joins rows, a circle is one within a row, and only the cells that the new one
-    waits for need a look; the whole order is found only to say which circle it is.
+    It must wait for itself, in its own row or through a summary of a whole column; the order of all
+    columns, which takes long, is found only to say which circle it is.
     """
-    if model.summaries or _waits_for_itself(model, new.name):
+    reads = needed(model, [new.name]) & set(model.summaries)
+    if new.name in needed(model, reads) or _waits_for_itself(model, new.name):
         schedule(model)
 
 
 def _waits_for_itself(model: Recurrence, name: str) -> bool:
+    """Whether a column needs itself in the same row."""
     seen: set[str] = set()
     todo = [name]
     while todo:
