@@ -61,6 +61,9 @@ class Exercise:
     veiled : tuple of str
         Columns and derived scalars that stay live in handouts, but hide their formulas: they repeat
         an answer's, or a part of it.
+    sealed : tuple of str
+        Worksheets whose given formulas stay live in handouts, but are hidden: they look like an
+        answer's, for another axis or camera. An answer may read them.
     draw : function of (generator, parameters), optional
         Draws other data columns anew, as lists by name; None in a list is a missing value.
 
@@ -84,6 +87,7 @@ class Exercise:
     frozen: tuple[str, ...] = ()
     task: tuple[str, ...] = ()
     veiled: tuple[str, ...] = ()
+    sealed: tuple[str, ...] = ()
     draw: Draw | None = None
 
     def __post_init__(self) -> None:
@@ -109,7 +113,7 @@ class Exercise:
             self.model.column(self.greyed)
         for name in set(self.alarm) - set(self.model.summaries):
             raise ModelError(f"{self.name}: alarm names {name}, which is no summary")
-        if unknown := {*self.sections, *self.frozen} - set(self.model.sections):
+        if unknown := {*self.sections, *self.frozen, *self.sealed} - set(self.model.sections):
             raise ModelError(f"{self.name} has no section {unknown.pop()!r}")
         for name in set(self.veiled) - set(self.model.derived_scalars):
             self.model.column(name)

@@ -7,9 +7,10 @@ from students import ADA, SECRET
 from sympy import Indexed
 
 from kfsheet import load_exercise
-from kfsheet.coursework.handout import own_run
+from kfsheet.coursework.handout import handout_pages, own_run
 from kfsheet.coursework.questions import question_pages
 from kfsheet.coursework.variation import own_numbers
+from kfsheet.excel.compose import Run
 from kfsheet.excel.layout import Layout
 from kfsheet.exercises import exercise_names
 from kfsheet.expressions import Missing
@@ -40,3 +41,16 @@ def test_the_sheet_of_questions_names_all_that_an_answer_is_made_of(name):
         needed = names_read(exercise.model, question.name)
         assert needed
         assert needed | {question.name} <= told, question.name
+
+
+@pytest.mark.parametrize("name", ["cannonball", "tennis"])
+def test_what_looks_like_an_answer_in_a_sealed_worksheet_is_live_and_not_shown(name):
+    exercise = load_exercise(name)
+    layout, now = Layout.standard(exercise.model), Run.of(exercise.model)
+    pages = [p for p in handout_pages(exercise, layout, now) if p.title in exercise.sealed]
+    asked = {(layout.home(q.name)) for q in exercise.questions if q.name in exercise.model.table}
+    assert {sheet for sheet, _ in asked} == {page.title for page in pages}
+    for page in pages:
+        kinds = {filled.kind for filled in page.columns.values() if filled.rules}
+        assert kinds <= {"veiled", "index"}
+        assert any(piece.kind == "answer" for piece in page.pieces.values())

@@ -50,6 +50,7 @@ YOURS = (
 LOCKED = {
     LEGEND["parameter"]: "a parameter: your own number, locked; the feedback holds for it only",
     LEGEND["data"]: "a measurement or another given number, locked; an empty one was not made",
+    LEGEND["formula"]: "a given formula, locked; some are hidden, since they look like an answer",
 }
 
 
@@ -158,6 +159,8 @@ def handout_pages(exercise: Exercise, layout: Layout, now: Run) -> list[Page]:
             _empty(by_title[sheet], (FIRST_ROW + step, column))
     for section in exercise.frozen:
         _freeze(by_title[section])
+    for section in exercise.sealed:
+        _seal(by_title[section])
     for name in exercise.veiled:
         if name in layout.scalars:
             sheet, *place = layout.scalars[name]
@@ -180,6 +183,12 @@ def _freeze(page: Page) -> None:
     for at, filled in page.columns.items():
         if filled.rules:
             page.columns[at] = replace(filled, kind="data", rules=())
+
+
+def _seal(page: Page) -> None:
+    for at, filled in page.columns.items():
+        if filled.rules and filled.kind == "formula":
+            _veil(page, at)
 
 
 def _veil(page: Page, at: int) -> None:

@@ -238,4 +238,5 @@ exercise = Exercise(
     },
     noise=("n_theta", "n_r"),
     frozen=("Linear",),
+    sealed=("EKF",),
 )
