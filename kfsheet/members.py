@@ -18,17 +18,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kfsheet.compiling import compiled_function
 from kfsheet.ensemble import NEES, Draws, Study
 from kfsheet.errors import DataError
 from kfsheet.evaluation import (
-    can_compile,
     check_data_name,
     checked_array,
     checked_parameters,
     facts_of,
 )
 from kfsheet.group import Found, Task, run_group
-from kfsheet.kernel import compiled_function, kernel_of
+from kfsheet.kernel import kernel_of
 from kfsheet.source import python_source
 
 if TYPE_CHECKING:
@@ -48,6 +48,7 @@ def study(
     nees: Mapping[str, NEES],
     executor: Executor | None,
     parameters: Mapping[str, Any],
+    compiled: bool | None = None,
 ) -> Study:
     """Run a recurrence for many members; :func:`kfsheet.evaluate` with ``members`` calls it.
 
@@ -72,6 +73,8 @@ def study(
         Who computes; threads on all cores by default. Processes need pickles of the arrays only.
     parameters : mapping
         Values, or arrays of length ``members``.
+    compiled : bool, optional
+        As in :func:`kfsheet.evaluate`; all members are computed in the same way.
 
     Raises
     ------
@@ -88,7 +91,7 @@ def study(
         if name not in {**model.derived_scalars, **model.summaries}:
             raise DataError(f"{model.name} has no scalar {name}")
     kept = None if scalars is None else tuple(scalars)
-    task = _first_task(model, members, data, names, kept, nees, parameters)
+    task = _first_task(model, members, data, names, kept, nees, parameters, compiled)
     task = replace(task, keep=len(quantiles) > 0)
     found = _computed(task, members, executor)
     return _study(model, members, [*names, *nees], task.kernel.scalars, found, quantiles)
@@ -102,6 +105,7 @@ def _first_task(
     scalars: tuple[str, ...] | None,
     nees: Mapping[str, NEES],
     parameters: Mapping[str, Any],
+    compiled: bool | None,
 ) -> Task:
     """The task of all members, to be cut into groups."""
     facts = facts_of(model)
@@ -122,7 +126,7 @@ def _first_task(
         series[name] = _member_data(model, name, values, members)
     return Task(
         kernel,
-        "" if can_compile() else python_source(model),
+        "" if facts.study_is_compiled(kernel, members, compiled) else python_source(model),
         model.name,
         facts.rows,
         0,
