@@ -344,11 +344,17 @@ def _checked_column(model: Recurrence, name: str, values: Any) -> list[float]:
 
 
 @lru_cache(maxsize=32)
+def source_of(model: Recurrence, version: int, wanted: tuple[str, ...] | None = None) -> str:
+    """The Python source of one version of a model."""
+    return python_source(model, wanted)
+
+
+@lru_cache(maxsize=32)
 def _python_function(
     model: Recurrence, version: int, wanted: tuple[str, ...] | None = None
 ) -> Callable:
     """The generated function of one version of a model."""
-    source = python_source(model, wanted)
+    source = source_of(model, version, wanted)
     filename = f"<kfsheet {model.name} {id(model)} {version}>"
     linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
     namespace: dict[str, Any] = {}

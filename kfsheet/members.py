@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kfsheet.compiling import compiled_function
+from kfsheet.compiling import compiled_function, is_ready
 from kfsheet.ensemble import NEES, Draws, Study
 from kfsheet.errors import DataError
 from kfsheet.evaluation import (
@@ -26,10 +26,10 @@ from kfsheet.evaluation import (
     checked_array,
     checked_parameters,
     facts_of,
+    source_of,
 )
 from kfsheet.group import Found, Task, run_group
 from kfsheet.kernel import kernel_of
-from kfsheet.source import python_source
 
 if TYPE_CHECKING:
     from kfsheet.recurrence import Recurrence
@@ -126,7 +126,9 @@ def _first_task(
         series[name] = _member_data(model, name, values, members)
     return Task(
         kernel,
-        "" if facts.study_is_compiled(kernel, members, compiled) else python_source(model),
+        ""
+        if facts.study_is_compiled(kernel, members, compiled)
+        else source_of(model, model.version),
         model.name,
         facts.rows,
         0,
@@ -191,7 +193,8 @@ def _computed(task: Task, members: int, executor: Executor | None) -> Found:
         return _gathered(task, members, executor)
     workers = os.cpu_count() or 1
     if task.compiled:
-        compiled_function(task.kernel.source)  # once, before the threads ask for it together
+        with _bar(members, "" if is_ready(task.kernel.source) else "compiling"):
+            compiled_function(task.kernel.source)
     pool = ThreadPoolExecutor(workers)
     try:
         return _gathered(task, members, pool)
@@ -222,10 +225,11 @@ def _gathered(task: Task, members: int, executor: Executor) -> Found:
     return whole
 
 
-def _bar(members: int) -> Any:
+def _bar(members: int, text: str = "") -> Any:
     from tqdm import tqdm
 
-    return tqdm(total=members, unit=" runs", leave=False, disable=not sys.stderr.isatty())
+    silent = not sys.stderr.isatty()
+    return tqdm(total=members, desc=text, unit=" runs", leave=False, disable=silent)
 
 
 def _groups(task: Task, members: int) -> Iterator[Task]:
