@@ -64,12 +64,16 @@ def compiled_function(source: str) -> Callable:
     Raises
     ------
     EngineError
-        If Numba is not installed.
+        If Numba is not installed, or cannot compile it.
     """
     if not can_compile():
         raise EngineError(MISSING)
-    with _ONE_AT_A_TIME:  # threads that ask for the same shall not all compile it
-        return _compiled(source)
+    try:
+        with _ONE_AT_A_TIME:  # threads that ask for the same shall not all compile it
+            return _compiled(source)
+    except Exception as error:
+        words = f"Numba cannot compile this model ({type(error).__name__}: {error})"
+        raise EngineError(f"{words}; compiled=False does without") from error
 
 
 _ONE_AT_A_TIME = Lock()
