@@ -26,6 +26,7 @@ from kfsheet import (
     compiling,
     evaluate,
     evaluation,
+    members,
     t,
     warm_up,
     when_observed,
@@ -249,6 +250,14 @@ def test_a_machine_without_a_compiler_says_so(monkeypatch):
     warm_up(small())
 
 
+def test_a_study_says_when_it_waits_for_the_compiler(monkeypatch, cache):
+    said, bar = [], members._bar
+    monkeypatch.setattr(members, "_bar", lambda n, text="": said.append(text) or bar(n, text))
+    for _ in range(2):
+        evaluate(small(), members=3, compiled=True)
+    assert said == ["compiling", "", "", ""]
+
+
 # -- on disk ---------------------------------------------------------------------------------
 
 PROGRAM = """
@@ -311,6 +320,17 @@ def test_a_source_that_was_changed_is_not_believed(source, cache):
     compiling._compiled.cache_clear()
     as_by_python(source)
     assert file.read_text() == source
+
+
+def test_machine_code_of_another_processor_is_not_ours(source, cache, monkeypatch):
+    from llvmlite import binding
+
+    as_by_python(source)
+    assert is_ready(source)
+    compiling._digest.cache_clear()
+    monkeypatch.setattr(binding, "get_host_cpu_name", lambda: "another")
+    assert not is_ready(source)
+    compiling._digest.cache_clear()
 
 
 def test_machine_code_that_nobody_has_used_for_a_season_is_deleted(source, cache):
