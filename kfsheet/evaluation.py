@@ -3,9 +3,9 @@
 A model that is run once or twice runs as Python. One that is run often is compiled (with Numba,
 where it is installed) by another process while Python goes on, and the machine code is kept on
 disk; see :mod:`kfsheet.compiling`. Both compute the same to rounding: of our exercises the
-cannon-ball's columns differ, by less than 2e-12 of their root mean square, because where Python's x**2
-calls pow, which errs in the last bit now and then, a compiler multiplies; scalars are summed otherwise.
-A computation that has no value is explained by Python's run.
+cannon-ball's columns differ, by less than 2e-12 of their root mean square, because where Python's
+x**2 calls pow, which errs in the last bit now and then, a compiler multiplies; scalars are summed
+otherwise. A computation that has no value is explained by Python's run.
 """
 
 from __future__ import annotations
