@@ -9,11 +9,13 @@ from measuring import Line, in_turn, peak_memory, seconds
 from one_run import AXIS, Axis
 
 import kfsheet as kf
+from kfsheet.compiling import can_compile
 from kfsheet.exercises.cannonball import cannonball
 from kfsheet.exercises.football import football
 from kfsheet.exercises.shuttlecock import shuttlecock
 
 MEMBERS = 10_000
+STUDY = {"members": MEMBERS, "scalars": (), "compiled": can_compile()}
 
 
 def lines() -> Iterator[Line]:
@@ -32,7 +34,7 @@ def cannonballs() -> Line:
     wanted = [*STATE, "NIS"]
 
     def ours() -> object:
-        return kf.evaluate(cannonball, data, members=MEMBERS, columns=wanted, scalars=())
+        return kf.evaluate(cannonball, data, columns=wanted, **STUDY)
 
     study = ours()
     c = c_library()
@@ -93,9 +95,7 @@ def footballs() -> Line:
     photos = photos + 3 * np.random.RandomState(2).standard_normal((MEMBERS, 16))
 
     def ours() -> object:
-        return kf.evaluate(
-            football, {"i": photos}, members=MEMBERS, columns=["x_a", "z_a"], scalars=()
-        )
+        return kf.evaluate(football, {"i": photos}, columns=["x_a", "z_a"], **STUDY)
 
     study, theirs = ours(), vectorised_football(photos)
     for name, table in theirs.items():
@@ -113,7 +113,7 @@ def shuttlecocks() -> Line:
     draws = np.random.RandomState(3).standard_normal((MEMBERS, shuttlecock.rows))
 
     def ours() -> object:
-        return kf.evaluate(shuttlecock, {"n_x": draws}, members=MEMBERS, columns=AXIS, scalars=())
+        return kf.evaluate(shuttlecock, {"n_x": draws}, columns=AXIS, **STUDY)
 
     run = kf.evaluate(shuttlecock)
     noise = (run["x_obs"] - run["x_true"])[1] / run["n_x"][1]

@@ -22,7 +22,7 @@ class WorkbookError(KfsheetError):
 
 
 class EngineError(KfsheetError):
-    """A spreadsheet engine is missing, crashed or ran out of time."""
+    """A spreadsheet engine or a compiler is missing, crashed or ran out of time."""
 
 
 class ForbiddenError(KfsheetError):

@@ -1,27 +1,32 @@
 """A recurrence as numbers: run its generated source, return a DataFrame.
 
 A model that is run once or twice runs as Python. One that is run often is compiled (with Numba,
-where it is installed), and the machine code is kept on disk; see :mod:`kfsheet.kernel`. Both
-compute the same to rounding, and a computation that has no value is explained by Python's run.
+where it is installed) by another process while Python goes on, and the machine code is kept on
+disk; see :mod:`kfsheet.compiling`. Both compute the same to rounding: of our exercises the
+cannon-ball's columns differ, by less than 2e-12 of their root mean square, because where Python's
+x**2 calls pow, which errs in the last bit now and then, a compiler multiplies; scalars are summed
+otherwise. A computation that has no value is explained by Python's run.
 """
 
 from __future__ import annotations
 
 import linecache
 import traceback
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from importlib.util import find_spec
 from math import isinf, nan
 from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from kfsheet.compiling import LOADING, can_compile, compiled_function, pays
 from kfsheet.errors import DataError
-from kfsheet.kernel import Kernel, compiled_function, is_ready, kernel_of
+from kfsheet.kernel import Kernel, kernel_of
 from kfsheet.parts import checked_values
+from kfsheet.schedule import needed
 from kfsheet.source import python_source
 
 if TYPE_CHECKING:
@@ -31,8 +36,6 @@ if TYPE_CHECKING:
 
     from kfsheet.ensemble import NEES, Draws, Study
     from kfsheet.recurrence import Recurrence
-
-WORTH_LOADING, WORTH_COMPILING = 500_000, 3_000_000  # cells computed by Python before
 
 
 def evaluate(
@@ -46,6 +49,7 @@ def evaluate(
     quantiles: Sequence[float] = (),
     nees: Mapping[str, NEES] | None = None,
     executor: Executor | None = None,
+    compiled: bool | None = None,
     **parameters: Any,
 ) -> pd.DataFrame | Study:
     """Run a recurrence once, or for many members.
@@ -65,6 +69,10 @@ def evaluate(
         How many runs; the result is then a :class:`~kfsheet.ensemble.Study`.
     scalars, quantiles, nees, executor
         With ``members``; see :func:`kfsheet.members.study`.
+    compiled : bool, optional
+        True waits for the compiler, False never uses it; so each gives the same bits whenever it
+        is called. By default a run is compiled when that pays: the last digits may then change
+        between two runs.
     **parameters : float
         Other values of parameters, by name; with ``members``, also arrays of that length.
 
@@ -79,6 +87,8 @@ def evaluate(
     DataError
         For an unknown name, a value that is not allowed, a column of the wrong length, or a
         computation without a value; the message names the formula and the row.
+    EngineError
+        If it shall be compiled and Numba is not installed.
 
     Examples
     --------
@@ -90,10 +100,10 @@ def evaluate(
         from kfsheet.members import study
 
         wanted = columns or (), scalars, quantiles
-        return study(model, members, data, *wanted, nees or {}, executor, parameters)
+        return study(model, members, data, *wanted, nees or {}, executor, parameters, compiled)
     if scalars is not None or quantiles or nees or executor:
         raise DataError("scalars, quantiles, nees and executor need many members; give members=")
-    return _one_run(model, data or {}, columns, parameters)
+    return _one_run(model, data or {}, columns, parameters, compiled)
 
 
 def _one_run(
@@ -101,12 +111,13 @@ def _one_run(
     data: Mapping[str, Sequence[float]],
     columns: Sequence[str] | None,
     parameters: Mapping[str, float],
+    compiled: bool | None,
 ) -> pd.DataFrame:
     facts = facts_of(model)
     wanted = facts.wanted(model, columns)
     values = checked_parameters(model, parameters)
     series = facts.arrays(model, data)
-    kernel = facts.kernel(model, wanted)
+    kernel = facts.kernel(model, wanted, compiled)
     found = kernel and _run_compiled(kernel, series, values, facts)
     out, scalars = found or _run_python(model, data, parameters, wanted)
     if columns is not None:
@@ -152,8 +163,12 @@ class Facts:
     default: dict[str, np.ndarray]
     units: dict[str, str]
     every: tuple[str, ...]
-    python_cells: int = 0
     frames: dict[tuple[str, ...], Any] = field(default_factory=dict)
+    widths: dict[tuple[str, ...], int] = field(default_factory=dict)
+    by_python: Counter = field(default_factory=Counter)
+    """Cells computed, for each choice of columns and each kernel of a study."""
+    kernels: dict[tuple[str, ...], Kernel] = field(default_factory=dict)
+    """Those whose machine code is there."""
 
     def wanted(self, model: Recurrence, columns: Sequence[str] | None) -> tuple[str, ...]:
         """Names of the columns to return, checked."""
@@ -172,15 +187,41 @@ class Facts:
             series[name] = checked_array(model, name, values)[None, :]
         return series
 
-    def kernel(self, model: Recurrence, wanted: tuple[str, ...]) -> Kernel | None:
-        """The compiled kernel, if the model is run so often that it is worth it."""
-        self.python_cells += self.rows * len(self.every)
-        if self.python_cells < WORTH_LOADING or not can_compile():
+    def kernel(
+        self, model: Recurrence, wanted: tuple[str, ...], compiled: bool | None
+    ) -> Kernel | None:
+        """The kernel of a single run, if that is for compiled code."""
+        if compiled is False:
             return None
-        scalars = None if wanted == self.every else tuple(model.derived_scalars)
-        kernel = kernel_of(model, model.version, wanted, scalars)
-        worth = self.python_cells >= WORTH_COMPILING or is_ready(kernel)
-        return kernel if worth else None
+        if wanted not in self.kernels:
+            before, cells = self.by_python[wanted], self._cells(model, wanted)
+            if not compiled and before + cells < LOADING:
+                self.by_python[wanted] += cells
+                return None
+            scalars = None if wanted == self.every else tuple(model.derived_scalars)
+            kernel = kernel_of(model, model.version, wanted, scalars)
+            if not compiled and not pays(kernel.source, cells, before):
+                self.by_python[wanted] += cells
+                return None
+            self.kernels[wanted] = kernel
+        return self.kernels[wanted]
+
+    def _cells(self, model: Recurrence, wanted: tuple[str, ...]) -> int:
+        """How many cells a run has."""
+        if wanted not in self.widths:
+            used = needed(model, (*wanted, *model.derived_scalars))
+            self.widths[wanted] = len(used.intersection(self.every))
+        return self.rows * self.widths[wanted]
+
+    def study_is_compiled(self, kernel: Kernel, members: int, compiled: bool | None) -> bool:
+        """Whether many runs are for compiled code, all of them."""
+        if compiled is not None:
+            return compiled
+        cells = members * self.rows * len(self.every)
+        if pays(kernel.source, cells, self.by_python[kernel]):
+            return True
+        self.by_python[kernel] += cells
+        return False
 
     def frame(
         self,
@@ -216,13 +257,10 @@ def facts_of(model: Recurrence) -> Facts:
     return facts
 
 
-def can_compile() -> bool:
-    """Whether Numba is installed."""
-    return find_spec("numba") is not None
-
-
 def warm_up(model: Recurrence, columns: Sequence[str] | None = None) -> None:
     """Compile a model now, rather than after some runs; does nothing without Numba.
+
+    For many runs, ``evaluate(model, members=1, compiled=True, ...)`` does the same.
 
     Parameters
     ----------
@@ -231,9 +269,7 @@ def warm_up(model: Recurrence, columns: Sequence[str] | None = None) -> None:
     columns : sequence of str, optional
         The columns that will be wanted, as in :func:`evaluate`.
     """
-    facts = facts_of(model)
-    facts.python_cells = WORTH_COMPILING
-    evaluate(model, columns=columns)
+    evaluate(model, columns=columns, compiled=can_compile())
 
 
 def run(
@@ -309,11 +345,17 @@ def _checked_column(model: Recurrence, name: str, values: Any) -> list[float]:
 
 
 @lru_cache(maxsize=32)
+def source_of(model: Recurrence, version: int, wanted: tuple[str, ...] | None = None) -> str:
+    """The Python source of one version of a model."""
+    return python_source(model, wanted)
+
+
+@lru_cache(maxsize=32)
 def _python_function(
     model: Recurrence, version: int, wanted: tuple[str, ...] | None = None
 ) -> Callable:
     """The generated function of one version of a model."""
-    source = python_source(model, wanted)
+    source = source_of(model, version, wanted)
     filename = f"<kfsheet {model.name} {id(model)} {version}>"
     linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
     namespace: dict[str, Any] = {}

@@ -10,8 +10,11 @@ from math import isnan, nan
 
 import numba
 
-compiled = numba.njit(cache=True, nogil=True, error_model="python")
+OPTIONS = {"nogil": True, "error_model": "python"}
 """How everything is compiled: without the interpreter's lock, and dividing as Python does."""
+
+# No cache of its own, which a read-only installation could not write: that of a kernel holds it.
+compiled = numba.njit(**OPTIONS)
 
 DOMAIN = "math domain error"
 

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from kfsheet.compiling import compiled_function
 from kfsheet.ensemble import Draws
 from kfsheet.errors import DataError
-from kfsheet.kernel import Kernel, compiled_function
+from kfsheet.kernel import Kernel
 from kfsheet.streaming import Sums
 
 

@@ -18,18 +18,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kfsheet.compiling import compiled_function, is_ready
 from kfsheet.ensemble import NEES, Draws, Study
 from kfsheet.errors import DataError
 from kfsheet.evaluation import (
-    can_compile,
     check_data_name,
     checked_array,
     checked_parameters,
     facts_of,
+    source_of,
 )
 from kfsheet.group import Found, Task, run_group
-from kfsheet.kernel import compiled_function, kernel_of
-from kfsheet.source import python_source
+from kfsheet.kernel import kernel_of
 
 if TYPE_CHECKING:
     from kfsheet.recurrence import Recurrence
@@ -48,6 +48,7 @@ def study(
     nees: Mapping[str, NEES],
     executor: Executor | None,
     parameters: Mapping[str, Any],
+    compiled: bool | None = None,
 ) -> Study:
     """Run a recurrence for many members; :func:`kfsheet.evaluate` with ``members`` calls it.
 
@@ -72,6 +73,8 @@ def study(
         Who computes; threads on all cores by default. Processes need pickles of the arrays only.
     parameters : mapping
         Values, or arrays of length ``members``.
+    compiled : bool, optional
+        As in :func:`kfsheet.evaluate`; all members are computed in the same way.
 
     Raises
     ------
@@ -88,7 +91,7 @@ def study(
         if name not in {**model.derived_scalars, **model.summaries}:
             raise DataError(f"{model.name} has no scalar {name}")
     kept = None if scalars is None else tuple(scalars)
-    task = _first_task(model, members, data, names, kept, nees, parameters)
+    task = _first_task(model, members, data, names, kept, nees, parameters, compiled)
     task = replace(task, keep=len(quantiles) > 0)
     found = _computed(task, members, executor)
     return _study(model, members, [*names, *nees], task.kernel.scalars, found, quantiles)
@@ -102,6 +105,7 @@ def _first_task(
     scalars: tuple[str, ...] | None,
     nees: Mapping[str, NEES],
     parameters: Mapping[str, Any],
+    compiled: bool | None,
 ) -> Task:
     """The task of all members, to be cut into groups."""
     facts = facts_of(model)
@@ -122,7 +126,9 @@ def _first_task(
         series[name] = _member_data(model, name, values, members)
     return Task(
         kernel,
-        "" if can_compile() else python_source(model),
+        ""
+        if facts.study_is_compiled(kernel, members, compiled)
+        else source_of(model, model.version),
         model.name,
         facts.rows,
         0,
@@ -187,7 +193,8 @@ def _computed(task: Task, members: int, executor: Executor | None) -> Found:
         return _gathered(task, members, executor)
     workers = os.cpu_count() or 1
     if task.compiled:
-        compiled_function(task.kernel.source)  # once, before the threads ask for it together
+        with _bar(members, "" if is_ready(task.kernel.source) else "compiling"):
+            compiled_function(task.kernel.source)
     pool = ThreadPoolExecutor(workers)
     try:
         return _gathered(task, members, pool)
@@ -218,10 +225,11 @@ def _gathered(task: Task, members: int, executor: Executor) -> Found:
     return whole
 
 
-def _bar(members: int) -> Any:
+def _bar(members: int, text: str = "") -> Any:
     from tqdm import tqdm
 
-    return tqdm(total=members, unit=" runs", leave=False, disable=not sys.stderr.isatty())
+    silent = not sys.stderr.isatty()
+    return tqdm(total=members, desc=text, unit=" runs", leave=False, disable=silent)
 
 
 def _groups(task: Task, members: int) -> Iterator[Task]:

@@ -16,7 +16,7 @@ RESERVED = frozenset(
     "t rows nan sqrt exp log sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh "
     "sign floor ceil abs min max pi observed present mean rms std total count largest smallest "
     "last sumproduct isnan fsum range len zip dict columns scalars model data "
-    "members executor".split()
+    "members executor compiled".split()
 )
 OWN_SHEETS = ("Read me", "Parameters", "Charts", "Check", "History", "Questions", "kfsheet")
 FORBIDDEN_IN_SHEETS = set("[]:*?/\\'{}!")

@@ -41,3 +41,25 @@ def engine(request):
 def football_file(tmp_path_factory):
     """The football workbook, freshly written; not to be changed."""
     return write_workbook(exercise, tmp_path_factory.mktemp("built"))
+
+
+@pytest.fixture(scope="session")
+def cluster(tmp_path_factory):
+    """Two processes of dask, started as on other machines, with a cache of their own."""
+    distributed = pytest.importorskip("distributed")
+    import dask
+
+    with (
+        dask.config.set({"distributed.worker.daemon": False}),  # a worker may start processes
+        distributed.LocalCluster(
+            n_workers=2,
+            threads_per_worker=1,
+            processes=True,
+            protocol="tcp://",
+            host="127.0.0.1",
+            dashboard_address=None,
+            env={"KFSHEET_CACHE": str(tmp_path_factory.mktemp("cluster"))},
+        ) as workers,
+        distributed.Client(workers) as client,
+    ):
+        yield client

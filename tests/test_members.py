@@ -1,6 +1,5 @@
-"""Compiled runs and many runs compute what single runs by Python compute."""
+"""Many runs compute what single runs compute."""
 
-import os
 import subprocess
 import sys
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
@@ -8,102 +7,20 @@ from multiprocessing import get_context
 
 import numpy as np
 import pytest
-from sympy import Max, Piecewise, Rational, acos, atan2, cos, floor, log, sin, sqrt
+from sympy import log, sqrt
 
 from kfsheet import (
     NEES,
-    RMS,
     DataError,
     Draws,
-    Largest,
-    Last,
-    Mean,
-    Missing,
     ModelError,
     Recurrence,
-    Smallest,
-    Std,
-    Sum,
     evaluate,
     t,
-    warm_up,
-    when_observed,
 )
-from kfsheet import evaluation as engine
+from kfsheet.compiling import can_compile
 from kfsheet.exercises.cannonball import cannonball
 from kfsheet.exercises.football import football
-from kfsheet.kernel import cache_folder, compiled_function, is_ready, kernel_of
-
-ROWS = 25
-
-
-def mixed():
-    """Lags, start rows, gaps, several passes and every kind of function."""
-    m = Recurrence("mixed", title="A bit of everything")
-    a = m.parameter("a", 0.3, "", "a", sign="positive")
-    p = m.parameter("p", 1.5, "", "an exponent")
-    values = np.random.RandomState(1).standard_normal(ROWS)
-    gaps = values.copy()
-    gaps[[3, 7, 8]] = np.nan
-    x = m.data("x", values, "", "complete", section="S")
-    y = m.data("y", gaps, "", "with gaps", section="S", may_be_missing=True)
-    u, v, w, z, c = m.columns("u", "v", "w", "z", "c", section="S")
-    m.define(u[t], u[t - 1] + a * v[t - 2] - x[t], "", "u", start=[0, 1 + a])
-    m.define(v[t], cos(u[t]) * (1 + x[t] ** 2) ** p, "", "v", start=[sqrt(a)])
-    m.define(w[t], when_observed(y[t], atan2(y[t], x[t - 1]) + floor(2 * y[t])), "", "w", start=[0])
-    mean = m.summary("mean_w", Mean(w), "", "mean")
-    m.define(z[t], log(1 + v[t] ** 2) * mean + z[t - 1] / 2, "", "second pass", start=[mean])
-    m.summary("std_z", Std(z), "", "spread")
-    clipped = Piecewise((Missing, z[t] > 1), (Max(z[t], acos(sin(x[t])), Rational(1, 3)), True))
-    m.define(c[t], clipped, "", "gaps of its own")
-    for aggregate in (RMS, Sum, Largest, Smallest, Last):
-        m.summary(f"{aggregate.__name__.lower()}_c", aggregate(c), "", "of c")
-    return m
-
-
-@pytest.fixture
-def by_python(monkeypatch):
-    """What Python alone computes."""
-
-    def compute(*arguments, **options):
-        with monkeypatch.context() as patch:
-            patch.setattr(engine, "can_compile", lambda: False)
-            return evaluate(*arguments, **options)
-
-    return compute
-
-
-def assert_same(ours, theirs, tolerance):
-    assert list(ours.columns) == list(theirs.columns)
-    for name in ours:
-        a, b = ours[name].to_numpy(), theirs[name].to_numpy()
-        assert (np.isnan(a) == np.isnan(b)).all(), name
-        scale = np.sqrt(np.nanmean(b**2)) if not np.isnan(b).all() else 1
-        assert np.nanmax(np.abs(a - b), initial=0) <= tolerance * max(scale, 1e-300), name
-
-
-@pytest.mark.parametrize(
-    ("model", "tolerance"),
-    [(mixed(), 1e-13), (football, 1e-13), (cannonball, 2e-12)],
-    ids=["mixed", "football", "cannonball"],
-)
-def test_compiled_and_python_agree(by_python, model, tolerance):
-    warm_up(model)
-    ours, theirs = evaluate(model), by_python(model)
-    assert_same(ours, theirs, tolerance)
-    for name, value in theirs.attrs["scalars"].items():
-        found = ours.attrs["scalars"][name]
-        assert found == pytest.approx(value, rel=10 * tolerance, nan_ok=True), name
-
-
-def test_a_few_columns_are_the_same_as_all():
-    some = ["z", "u"]
-    model = mixed()
-    warm_up(model, some)
-    warm_up(model)
-    assert evaluate(model, columns=some).equals(evaluate(model)[some])
-    with pytest.raises(ModelError, match="no column 'q'"):
-        evaluate(model, columns=["q"])
 
 
 @pytest.mark.parametrize(
@@ -120,56 +37,9 @@ def test_what_has_no_value_is_explained_as_before(rule, message):
     a = m.parameter("a", 0.5, "", "a")
     (v,) = m.columns("v", section="S")
     m.define(v[t], rule(v, a), "", "v", start=[1])
-    engine.facts_of(m).python_cells = engine.WORTH_COMPILING
-    with pytest.raises(DataError, match=message):
-        evaluate(m)
-
-
-def test_a_first_small_run_does_not_wait_for_a_compiler():
-    model = mixed()
-    model.parameter("unlike", 0, "", "so that its kernel is a new one")
-    evaluate(model)
-    assert not is_ready(kernel_of(model, model.version))
-    for _ in range(engine.WORTH_COMPILING // (ROWS * len(model.all_columns())) + 1):
-        evaluate(model)
-    assert is_ready(kernel_of(model, model.version))
-
-
-PROGRAM = """
-import sys
-sys.path.insert(0, {folder!r})
-from test_members import mixed
-from kfsheet import evaluate, warm_up
-from kfsheet.kernel import compiled_function, kernel_of
-model = mixed()
-warm_up(model)
-stats = compiled_function(kernel_of(model, model.version).source).stats
-print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
-"""
-
-
-def test_a_second_process_finds_the_machine_code_on_disk(tmp_path):
-    program = PROGRAM.format(folder=os.path.dirname(__file__))
-    environment = {**os.environ, "KFSHEET_CACHE": str(tmp_path)}
-    found = [
-        subprocess.run(
-            [sys.executable, "-c", program],
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout.split()
-        for _ in range(2)
-    ]
-    assert found == [["0", "1"], ["1", "0"]]
-
-
-def test_a_cache_that_cannot_be_written_does_not_stop_anybody(monkeypatch, tmp_path):
-    blocker = tmp_path / "file"
-    blocker.write_text("in the way")
-    monkeypatch.setenv("KFSHEET_CACHE", str(blocker))
-    assert cache_folder().is_dir()
-    assert blocker.read_text() == "in the way"
+    for compiled in (False, can_compile()):
+        with pytest.raises(DataError, match=message):
+            evaluate(m, compiled=compiled)
 
 
 # -- many members ----------------------------------------------------------------------------
@@ -184,7 +54,8 @@ def small_groups(monkeypatch):
 
 
 def flights(count=MANY, **options):
-    return evaluate(football, members=count, columns=["e_x_a", "d_i"], **options)
+    options = {"columns": ["e_x_a", "d_i"], "compiled": can_compile(), **options}
+    return evaluate(football, members=count, **options)
 
 
 @pytest.fixture(scope="module")
@@ -198,8 +69,8 @@ def photos():
 def test_members_are_the_single_runs_bit_for_bit(photos):
     r_i = np.linspace(1, 100, MANY)
     study = flights(data=photos, r_i=r_i, h=0, p=2)
-    warm_up(football)
-    singles = [evaluate(football, {"i": photos["i"][k]}, r_i=r_i[k], h=0, p=2) for k in range(MANY)]
+    alone = {"h": 0, "p": 2, "compiled": can_compile()}
+    singles = [evaluate(football, {"i": photos["i"][k]}, r_i=r_i[k], **alone) for k in range(MANY)]
     for name in ("e_x_a", "d_i"):
         stack = np.array([run[name] for run in singles])
         found = study.rows[name]
@@ -256,31 +127,8 @@ def test_whoever_computes_the_result_is_the_same_to_the_last_bit(photos, make):
     assert here.scalars.equals(there.scalars)
 
 
-@pytest.mark.filterwarnings("ignore")  # what a cluster warns of is its own affair
-def test_a_cluster_computes_the_same(photos):
-    distributed = pytest.importorskip("distributed")
-    here = flights(data=photos)
-    with (
-        distributed.LocalCluster(
-            n_workers=1,
-            threads_per_worker=1,
-            processes=False,
-            protocol="tcp://",
-            dashboard_address=None,
-            host="127.0.0.1",
-        ) as cluster,
-        distributed.Client(cluster) as client,
-    ):
-        there = flights(data=photos, executor=client.get_executor())
-    assert all(here.rows[name].equals(there.rows[name]) for name in here.rows)
-
-
-def test_without_a_compiler_the_statistics_are_the_same(monkeypatch, photos):
-    from kfsheet import members
-
-    fast = flights(data=photos)
-    monkeypatch.setattr(members, "can_compile", lambda: False)
-    slow = flights(data=photos)
+def test_without_a_compiler_the_statistics_are_the_same(photos):
+    fast, slow = flights(data=photos), flights(data=photos, compiled=False)
     for name in fast.rows:
         np.testing.assert_allclose(slow.rows[name], fast.rows[name], rtol=1e-9, atol=1e-12)
 
@@ -394,8 +242,3 @@ def test_an_interrupt_leaves_nothing_running(monkeypatch):
         flights(1000)
     monkeypatch.undo()
     assert flights(10).members == 10
-
-
-def test_the_compiled_function_is_the_same_object_for_the_same_model():
-    kernel = kernel_of(football, football.version)
-    assert compiled_function(kernel.source) is compiled_function(kernel.source)

@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
+from kfsheet.errors import EngineError
+
 MEMORY = 3 * 2**30  # bytes of address space
 SECONDS = 120.0
 BATCH = 25  # files that a worker of an executor judges before it reports
@@ -69,12 +71,19 @@ def run_on(
 
     Each of its workers judges files in a process of its own, so that the limits hold there too;
     dask's workers may start one if they run with ``distributed.worker.daemon: False``.
+
+    Raises
+    ------
+    EngineError
+        If the executor's workers may not start processes.
     """
     batches = [tasks[n : n + BATCH] for n in range(0, len(tasks), BATCH)]
     running = {executor.submit(_batch, function, batch, seconds): batch for batch in batches}
     try:
         for future in as_completed(running):
             error = future.exception()
+            if isinstance(error, EngineError):
+                raise error  # it is no fault of a file
             failed = Failed(f"{type(error).__name__}: {error}")
             yield from future.result() if error is None else [(t, failed) for t in running[future]]
     finally:
@@ -83,6 +92,11 @@ def run_on(
 
 
 def _batch(function: Callable[..., Any], tasks: Sequence[tuple], seconds: float) -> list[tuple]:
+    if multiprocessing.current_process().daemon:
+        raise EngineError(
+            "the executor's workers may not start processes, in which files are judged; "
+            "dask's may with the setting distributed.worker.daemon: False"
+        )
     return list(Pool(function, 1, seconds=seconds).run(tasks))
 
 
