@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from kfsheet.ensemble import Draws
 from kfsheet.errors import DataError
+from kfsheet.evaluation import without_value
 from kfsheet.kernel import Kernel, compiled_function
 from kfsheet.streaming import Sums
 
@@ -31,6 +32,9 @@ class Task:
 
     keep: bool = False
     """Whether the scalars of all members are kept, for quantiles."""
+
+    gaps: dict[str, np.ndarray] = field(default_factory=dict)
+    """Where a value may be missing; for Python."""
 
     @property
     def compiled(self) -> bool:
@@ -67,9 +71,6 @@ def run_group(task: Task) -> Found:
     results = np.empty((number, len(task.kernel.scalars)))
     run = _run_compiled if task.compiled else _run_python
     run(task, data, out, results)
-    if np.isinf(out).any():
-        member = task.first + int(np.nonzero(np.isinf(out))[0][0])
-        raise DataError(f"{task.name}, member {member}: a value grows beyond all bounds")
     nees = [_nees(out[:, list(e)], out, at) for e, at in task.nees]
     values = np.concatenate([out[:, list(task.statistics)], *(n[:, None] for n in nees)], axis=1)
     return Found(number, Sums.of(values), Sums.of(results), [results] if task.keep else [])
@@ -125,6 +126,11 @@ def _run_python(
                 f"{task.name}, member {task.first + k} has no value: {error}; "
                 "run it alone to see where"
             ) from None
+        if reason := without_value(columns, scalars, task.gaps):
+            raise DataError(
+                f"{task.name}, member {task.first + k} has no value: {reason}; "
+                "run it alone to see where"
+            )
         out[k] = [columns[name] for name in task.kernel.columns]
         results[k] = [scalars[name] for name in task.kernel.scalars]
 

@@ -26,6 +26,7 @@ from kfsheet.evaluation import (
     checked_array,
     checked_parameters,
     facts_of,
+    gaps_of,
 )
 from kfsheet.group import Found, Task, run_group
 from kfsheet.kernel import compiled_function, kernel_of
@@ -122,7 +123,7 @@ def _first_task(
         series[name] = _member_data(model, name, values, members)
     return Task(
         kernel,
-        "" if can_compile() else python_source(model),
+        "" if can_compile() else python_source(model, [*kernel.columns, *kernel.scalars]),
         model.name,
         facts.rows,
         0,
@@ -138,6 +139,7 @@ def _first_task(
             )
             for spec in nees.values()
         ),
+        gaps=gaps_of(model, model.version),
     )
 
 
