@@ -93,7 +93,22 @@ def evaluate(
         return study(model, members, data, *wanted, nees or {}, executor, parameters)
     if scalars is not None or quantiles or nees or executor:
         raise DataError("scalars, quantiles, nees and executor need many members; give members=")
+    _check_one_run(data, columns, parameters)
     return _one_run(model, data or {}, columns, parameters)
+
+
+def _check_one_run(data: Any, columns: Any, parameters: Mapping[str, Any]) -> None:
+    """Refuse what only many members take, and what has the wrong form."""
+    if isinstance(columns, str):
+        raise DataError(f"columns is the text {columns!r}; give a list: [{columns!r}]")
+    if data is not None and not hasattr(data, "items"):
+        kind = type(data).__name__
+        remedy = "give members=" if kind == "Draws" else "give {name: values}"
+        raise DataError(f"data is a {kind}; {remedy}")
+    many = [n for n, v in parameters.items() if np.ndim(v) > 0]
+    many += [n for n, v in (data or {}).items() if getattr(v, "ndim", 1) > 1]
+    if many:
+        raise DataError(f"{many[0]} has values for many runs; give members=")
 
 
 def _one_run(

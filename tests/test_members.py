@@ -389,7 +389,7 @@ def test_an_interrupt_leaves_nothing_running(monkeypatch):
     def interrupted(task):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(members, "run_group", interrupted)
+    monkeypatch.setattr("kfsheet.running.run_group", interrupted)
     with pytest.raises(KeyboardInterrupt):
         flights(1000)
     monkeypatch.undo()
