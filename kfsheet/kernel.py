@@ -130,11 +130,12 @@ class _Source:
         parameters = tuple(self.model.parameters)
         columns = self.model.table.values()
         data = tuple(c.name for c in columns if c.is_data and c.name in self.needed)
-        head = self._head(data)
+        derived = self.model.derived_scalars.values()
+        fixed = self._scalar_lines(s for s in derived if s.name in self.needed)
         self._in_rows = True
         body = list(self._body())
-        once = [f"        {name} = {text}" for text, name in self._once.items()]
-        lines = [*head, *once, *body, *self._tail()]
+        fixed += [f"        {name} = {text}" for text, name in self._once.items()]
+        lines = [*self._head(data, fixed), *self._member(data), *body, *self._tail()]
         source = "\n".join([PRELUDE, *lines, ""])
         return Kernel(source, parameters, data, tuple(self.stored), self.scalars)
 
@@ -174,26 +175,34 @@ class _Source:
 
     # -- lines -------------------------------------------------------------------------------
 
-    def _head(self, data: tuple[str, ...]) -> list[str]:
+    def _head(self, data: tuple[str, ...], fixed: list[str]) -> list[str]:
+        """What follows from the parameters, computed once where all members share them."""
         # Everything of ours begins with kfsheet_, which no name of a model does.
         names = "".join(f"kfsheet_all_{name}, " for name in data)
-        lines = [
+        return [
             "def kernel(kfsheet_first, kfsheet_last, kfsheet_ps, "
             f"{names}kfsheet_outs, kfsheet_rs):",
             "    rows = kfsheet_outs.shape[2]",
             "    for kfsheet_k in range(kfsheet_first, kfsheet_last):",
-            "        kfsheet_out = kfsheet_outs[kfsheet_k - kfsheet_first]",
-            "        kfsheet_p = kfsheet_ps[min(kfsheet_k, kfsheet_ps.shape[0] - 1)]",
+            "        if kfsheet_k == kfsheet_first or kfsheet_ps.shape[0] > 1:",
+            "            kfsheet_p = kfsheet_ps[min(kfsheet_k, kfsheet_ps.shape[0] - 1)]",
+            "            kfsheet_bad = 0.0  # NaN as soon as anything is not finite",
+            *(f"            {n} = kfsheet_p[{k}]" for k, n in enumerate(self.model.parameters)),
+            *(f"    {line}" for line in fixed),
+            "            kfsheet_fixed = kfsheet_bad",
         ]
-        lines.append("        kfsheet_bad = 0.0  # NaN as soon as anything is not finite")
-        lines += [f"        {n} = kfsheet_p[{k}]" for k, n in enumerate(self.model.parameters)]
+
+    def _member(self, data: tuple[str, ...]) -> list[str]:
+        lines = [
+            "        kfsheet_bad = kfsheet_fixed",
+            "        kfsheet_out = kfsheet_outs[kfsheet_k - kfsheet_first]",
+        ]
         for name in data:
             every = f"kfsheet_all_{name}"
             lines.append(f"        {name} = {every}[min(kfsheet_k, {every}.shape[0] - 1)]")
             if name in self.stored:
                 lines.append(f"        kfsheet_out[{self.stored[name]}] = {name}")
-        derived = self.model.derived_scalars.values()
-        return lines + self._scalar_lines(s for s in derived if s.name in self.needed)
+        return lines
 
     def _scalar_lines(self, scalars: Iterator) -> list[str]:
         lines = []
