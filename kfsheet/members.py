@@ -66,7 +66,7 @@ def study(
         Scalars of which statistics over the members are wanted; all by default.
     quantiles : sequence of float
         Quantiles of the scalars over the members, from 0 to 1, exact. The scalars of all members
-        are kept for them, beyond 32 MB in a temporary file: 8 bytes each, so ask with
+        are kept for them, beyond 8 MB in a temporary file: 8 bytes each, so ask with
         ``scalars`` for those that matter. Nothing else grows with the number of members.
     nees : mapping of str to NEES
         Further quantities, by names of their own.

@@ -13,8 +13,8 @@ from types import TracebackType
 
 import numpy as np
 
-IN_MEMORY = 2**25  # bytes
-AT_ONCE = 2**21  # numbers that are sorted together
+IN_MEMORY = 2**23  # bytes
+AT_ONCE = 2**20  # numbers that are sorted together
 SPLITS = 2**14
 
 

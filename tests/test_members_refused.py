@@ -45,7 +45,7 @@ from kfsheet.exercises.football import football
         ({"members": 3, "data": {"i": np.ones((3, 16, 2))}}, r"shape \(3, 16, 2\); give 3 x 16"),
         ({"members": 3, "r_i": np.ones((3, 2))}, "r_i has 3 x 2 values for 3 members"),
         ({"members": 3, "r_i": [1, "2", 3]}, "r_i of member 1 is '2'"),
-        ({"members": 3, "r_i": [1, 0, 3]}, "r_i of member 1 is 0"),
+        ({"members": 3, "dt": [1, 0, 3]}, "dt of member 1 is 0"),
         ({"members": 3, "h": [1, np.nan, 3]}, "h of member 1 is nan"),
     ],
 )
