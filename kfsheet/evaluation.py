@@ -16,7 +16,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from math import isinf, nan
+from math import isinf
 from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
@@ -103,7 +103,22 @@ def evaluate(
         return study(model, members, data, *wanted, nees or {}, executor, parameters, compiled)
     if scalars is not None or quantiles or nees or executor:
         raise DataError("scalars, quantiles, nees and executor need many members; give members=")
+    _check_one_run(data, columns, parameters)
     return _one_run(model, data or {}, columns, parameters, compiled)
+
+
+def _check_one_run(data: Any, columns: Any, parameters: Mapping[str, Any]) -> None:
+    """Refuse what only many members take, and what has the wrong form."""
+    if isinstance(columns, str):
+        raise DataError(f"columns is the text {columns!r}; give a list: [{columns!r}]")
+    if data is not None and not hasattr(data, "items"):
+        kind = type(data).__name__
+        remedy = "give members=" if kind == "Draws" else "give {name: values}"
+        raise DataError(f"data is a {kind}; {remedy}")
+    many = [n for n, v in parameters.items() if np.ndim(v) > 0]
+    many += [n for n, v in (data or {}).items() if getattr(v, "ndim", 1) > 1]
+    if many:
+        raise DataError(f"{many[0]} has values for many runs; give members=")
 
 
 def _one_run(
@@ -137,11 +152,7 @@ def _run_compiled(
         function(0, 1, numbers, *(series[name] for name in kernel.data), out, results)
     except (ArithmeticError, ValueError):
         return None
-    if np.isinf(out).any():
-        return None
-    found = results[0].tolist()
-    scalars = {n: nan if isinf(v) else v for n, v in zip(kernel.scalars, found, strict=True)}
-    return out[0], scalars
+    return out[0], dict(zip(kernel.scalars, results[0].tolist(), strict=True))
 
 
 def _run_python(
@@ -286,18 +297,40 @@ def run(
         columns, scalars = function(**series, **values)
     except (ArithmeticError, ValueError, TypeError) as error:
         raise DataError(_explain(model, error)) from None
-    array = np.array(list(columns.values()))
-    if array.dtype.kind != "f" or np.isinf(array).any():
-        _check_finite(model, columns)
-    scalars = {name: nan if isinf(value) else value for name, value in scalars.items()}
+    if reason := without_value(columns, scalars, gaps_of(model, model.version)):
+        raise DataError(f"{model.name}: {reason}")
     return columns, scalars, values
 
 
-def _check_finite(model: Recurrence, columns: Mapping[str, list]) -> None:
+@lru_cache(maxsize=32)
+def gaps_of(model: Recurrence, version: int) -> dict[str, np.ndarray]:
+    """Where a value may be missing: a vector over the rows for every column where one may."""
+    found = {}
+    for column in model.all_columns():
+        rows = np.full(model.rows, column.may_be_missing)
+        for row in range(min(len(column.start), model.rows)):
+            rows[row] = column.gap_possible(range(row, row + 1))
+        if rows.any():
+            found[column.name] = rows
+    return found
+
+
+def without_value(
+    columns: Mapping[str, list], scalars: Mapping[str, float], gaps: Mapping[str, np.ndarray]
+) -> str:
+    """What is infinite, complex, or NaN though nothing was missing; '' if nothing is."""
     for name, column in columns.items():
-        for row, value in enumerate(column):
-            if isinstance(value, complex) or isinf(value):
-                raise DataError(f"{model.name}: {name} in row {row} is {value}, no finite number")
+        array = np.array(column)
+        bad = np.iscomplex(array) | ~np.isfinite(array)
+        if bad.any() and name in gaps:
+            bad &= ~(gaps[name] & np.isnan(array))
+        if bad.any():
+            row = int(np.argmax(bad))
+            return f"{name} in row {row} is {column[row]}, no finite number"
+    for name, value in scalars.items():
+        if isinf(value):
+            return f"{name} is {value}, no finite number"
+    return ""
 
 
 def checked_parameters(model: Recurrence, given: Mapping[str, Any]) -> dict[str, float]:

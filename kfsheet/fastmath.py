@@ -1,8 +1,8 @@
 """What compiled kernels need: math that refuses what Python's refuses, and aggregates.
 
-Numba's own sqrt(-1) is NaN, which would pass for a missing value; Python raises an error. So do
-these. Aggregates add with Neumaier's compensation, which agrees with math.fsum to about one unit
-in the last place; as everywhere, missing values (NaN) are left out.
+Numba's own sqrt(-1) is NaN, which would pass for a missing value, and its exp(1000) is infinite;
+Python raises an error. So do these. Aggregates add with Neumaier's compensation, which agrees with
+math.fsum to about one unit in the last place; as everywhere, missing values (NaN) are left out.
 """
 
 import math
@@ -17,6 +17,29 @@ OPTIONS = {"nogil": True, "error_model": "python"}
 compiled = numba.njit(**OPTIONS)
 
 DOMAIN = "math domain error"
+RANGE = "it grows beyond 1e308"
+
+
+@compiled
+def bounded(x):
+    if math.isinf(x):
+        raise OverflowError(RANGE)
+    return x
+
+
+@compiled
+def exp(x):
+    return bounded(math.exp(x))
+
+
+@compiled
+def cosh(x):
+    return bounded(math.cosh(x))
+
+
+@compiled
+def sinh(x):
+    return bounded(math.sinh(x))
 
 
 @compiled
@@ -65,7 +88,7 @@ def atanh(x):
 def power(x, y):
     if (x < 0 and y != math.floor(y)) or (x == 0 and y < 0):
         raise ValueError(DOMAIN)
-    return float(x) ** y
+    return bounded(float(x) ** y)
 
 
 @compiled
@@ -95,6 +118,7 @@ def total(column):
         new = whole + x
         rest += (whole - new) + x if abs(whole) >= abs(x) else (x - new) + whole
         whole = new
+    bounded(whole)
     return whole + rest
 
 
@@ -144,6 +168,6 @@ def sumproduct(first, second):
     return total(first * second)
 
 
-CHECKED = "sqrt log asin acos acosh atanh power".split()
+CHECKED = "bounded exp cosh sinh sqrt log asin acos acosh atanh power".split()
 AGGREGATES = "count total mean rms std largest smallest last sumproduct".split()
 NAMES = [*CHECKED, "observed", "sign", *AGGREGATES]

@@ -6,15 +6,15 @@ keeps in registers. :mod:`kfsheet.compiling` makes machine code of it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from sympy import Expr, Indexed
+from sympy import Add, Expr, Indexed, Mul, Piecewise, Pow
 
 from kfsheet.checks import columns_read
-from kfsheet.expressions import column_references, lag
+from kfsheet.expressions import Missing, column_references, lag
 from kfsheet.pythoncode import PythonPrinter
 from kfsheet.schedule import Pass, needed
 
@@ -59,6 +59,7 @@ class _Printer(PythonPrinter):
         super().__init__()
         self._source = source
         self._branches = 0
+        self._hiding = 0  # depth inside what may turn an infinite value into a finite one
 
     def _print_Indexed(self, expr: Indexed) -> str:
         return self._source.cell(str(expr.base.label), int(lag(expr)))
@@ -68,14 +69,32 @@ class _Printer(PythonPrinter):
 
     def _print_Piecewise(self, expr: Expr) -> str:
         self._branches += 1
+        self._hiding += 1
         try:
             return super()._print_Piecewise(expr)
         finally:
             self._branches -= 1
+            self._hiding -= 1
+
+    def _denominator(self, factors: list[Expr]) -> str:
+        self._hiding += 1
+        try:
+            return super()._denominator(factors)
+        finally:
+            self._hiding -= 1
+
+    def _call(self, name: str, *arguments: Expr) -> str:
+        self._hiding += 1
+        try:
+            return super()._call(name, *arguments)
+        finally:
+            self._hiding -= 1
 
     def _print_Pow(self, expr: Expr) -> str:
         if expr.exp.is_Integer or (-2 * expr.exp).is_Integer:
-            return super()._print_Pow(expr)
+            text = super()._print_Pow(expr)
+            # Python refuses a power that overflows; in a sum it is seen at the end of the row.
+            return f"bounded({text})" if self._hiding and expr.exp.is_positive else text
         text = self._call("power", expr.base, expr.exp)
         # In a branch that is not taken it may have no value, so it stays there.
         return text if self._branches else self._source.once(expr, text)
@@ -101,11 +120,12 @@ class _Source:
         parameters = tuple(self.model.parameters)
         columns = self.model.table.values()
         data = tuple(c.name for c in columns if c.is_data and c.name in self.needed)
-        head = self._head(data)
+        derived = self.model.derived_scalars.values()
+        fixed = self._scalar_lines(s for s in derived if s.name in self.needed)
         self._in_rows = True
         body = list(self._body())
-        once = [f"        {name} = {text}" for text, name in self._once.items()]
-        lines = [*head, *once, *body, *self._tail()]
+        fixed += [f"        {name} = {text}" for text, name in self._once.items()]
+        lines = [*self._head(data, fixed), *self._member(data), *body, *self._tail()]
         source = "\n".join([PRELUDE, *lines, ""])
         return Kernel(source, parameters, data, tuple(self.stored), self.scalars)
 
@@ -145,28 +165,41 @@ class _Source:
 
     # -- lines -------------------------------------------------------------------------------
 
-    def _head(self, data: tuple[str, ...]) -> list[str]:
+    def _head(self, data: tuple[str, ...], fixed: list[str]) -> list[str]:
+        """What follows from the parameters, computed once where all members share them."""
         # Everything of ours begins with kfsheet_, which no name of a model does.
         names = "".join(f"kfsheet_all_{name}, " for name in data)
-        lines = [
+        return [
             "def kernel(kfsheet_first, kfsheet_last, kfsheet_ps, "
             f"{names}kfsheet_outs, kfsheet_rs):",
             "    rows = kfsheet_outs.shape[2]",
             "    for kfsheet_k in range(kfsheet_first, kfsheet_last):",
-            "        kfsheet_out = kfsheet_outs[kfsheet_k - kfsheet_first]",
-            "        kfsheet_p = kfsheet_ps[min(kfsheet_k, kfsheet_ps.shape[0] - 1)]",
+            "        if kfsheet_k == kfsheet_first or kfsheet_ps.shape[0] > 1:",
+            "            kfsheet_p = kfsheet_ps[min(kfsheet_k, kfsheet_ps.shape[0] - 1)]",
+            "            kfsheet_bad = 0.0  # NaN as soon as anything is not finite",
+            *(f"            {n} = kfsheet_p[{k}]" for k, n in enumerate(self.model.parameters)),
+            *(f"    {line}" for line in fixed),
+            "            kfsheet_fixed = kfsheet_bad",
         ]
-        lines += [f"        {n} = kfsheet_p[{k}]" for k, n in enumerate(self.model.parameters)]
+
+    def _member(self, data: tuple[str, ...]) -> list[str]:
+        lines = [
+            "        kfsheet_bad = kfsheet_fixed",
+            "        kfsheet_out = kfsheet_outs[kfsheet_k - kfsheet_first]",
+        ]
         for name in data:
             every = f"kfsheet_all_{name}"
             lines.append(f"        {name} = {every}[min(kfsheet_k, {every}.shape[0] - 1)]")
             if name in self.stored:
                 lines.append(f"        kfsheet_out[{self.stored[name]}] = {name}")
-        derived = self.model.derived_scalars.values()
-        return lines + self._scalar_lines(s for s in derived if s.name in self.needed)
+        return lines
 
     def _scalar_lines(self, scalars: Iterator) -> list[str]:
-        return [f"        {s.name} = {self._code(s.expression)}" for s in scalars]
+        lines = []
+        for s in scalars:
+            lines.append(f"        {s.name} = float({self._code(s.expression)})")
+            lines.append(f"        kfsheet_bad += {_unless_missing(s.name)}")
+        return lines
 
     def _body(self) -> Iterator[str]:
         for number, step in enumerate(self.passes):
@@ -187,8 +220,23 @@ class _Source:
         for row, columns in enumerate(step.rows[:-1]):
             yield f"        t = {row}"
             yield from self._one_row(columns, row, depth, " " * 8)
-        yield f"        for t in range({len(step.rows) - 1}, rows):"
-        yield from self._one_row(general, len(step.rows) - 1, depth, " " * 12)
+            yield from self._test(columns, row, " " * 8)
+        loop = len(step.rows) - 1
+        yield f"        for t in range({loop}, rows):"
+        yield from self._one_row(general, loop, depth, " " * 12)
+        # What is infinite makes those infinite that carry it, up to the end of the table.
+        carried = {name for c in general for name in _carried(c.expression)}
+        yield from self._test([c for c in general if c.name not in carried], loop, " " * 12)
+        yield f"        if rows > {loop}:"
+        yield from self._test(general, loop, " " * 12)
+
+    def _test(self, columns: Sequence[Column], row: int, indent: str) -> Iterator[str]:
+        """Note what is not finite in a row; NaN is fine where the rule may give no value."""
+        tests = [
+            _unless_missing(c.name) if c.definition(row).has(Missing) else f"({c.name} - {c.name})"
+            for c in columns
+        ]
+        yield f"{indent}kfsheet_bad += {_balanced(tests) if tests else 0.0}"
 
     def _one_row(
         self, columns: tuple[Column, ...], row: int, depth: dict[str, int], indent: str
@@ -217,18 +265,53 @@ class _Source:
 
     def _tail(self) -> list[str]:
         return [
+            "        if kfsheet_bad != 0:",
+            '            raise OverflowError("it grows beyond 1e308")',
+            *self._results(),
+        ]
+
+    def _results(self) -> list[str]:
+        return [
             f"        kfsheet_rs[kfsheet_k - kfsheet_first, {n}] = {name}"
             for n, name in enumerate(self.scalars)
         ]
 
 
+def _unless_missing(name: str) -> str:
+    """0, or NaN for what is infinite; missing values are fine."""
+    return f"(0.0 if isnan({name}) else {name} - {name})"
+
+
+@lru_cache(maxsize=4096)
+def _carried(rule: Expr) -> frozenset[str]:
+    """Columns whose infinite or undefined value makes that of ``rule`` so too, in any case.
+
+    Those of this row or of the one before: so what is carried on is seen in the last row.
+    """
+    if isinstance(rule, Indexed):
+        return frozenset({str(rule.base.label)} if lag(rule) <= 1 else ())
+    if isinstance(rule, Piecewise):
+        return frozenset.intersection(*(_carried(value) for value, _ in rule.args))
+    if isinstance(rule, Add | Mul) or (isinstance(rule, Pow) and rule.exp.is_positive):
+        terms = rule.args[:1] if isinstance(rule, Pow) else rule.args
+        return frozenset().union(*map(_carried, terms))
+    return frozenset()
+
+
+def _balanced(terms: list[str]) -> str:
+    """A sum in pairs, so that no addition waits for all of those before."""
+    while len(terms) > 1:
+        terms = [f"({' + '.join(terms[n : n + 2])})" for n in range(0, len(terms), 2)]
+    return terms[0]
+
+
 PRELUDE = '''"""Generated by kfsheet; this file may be deleted at any time."""
 
-from math import atan, atan2, ceil, cos, cosh, exp, floor, nan, pi, sin, sinh, tan, tanh, asinh
+from math import asinh, atan, atan2, ceil, cos, floor, isnan, nan, pi, sin, tan, tanh
 
 from kfsheet.fastmath import (
-    acos, acosh, asin, atanh, count, largest, last, log, mean, observed, power, rms, sign,
-    smallest, sqrt, std, sumproduct, total
+    acos, acosh, asin, atanh, bounded, cosh, count, exp, largest, last, log, mean, observed,
+    power, rms, sign, sinh, smallest, sqrt, std, sumproduct, total
 )
 
 '''

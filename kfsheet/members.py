@@ -8,34 +8,33 @@ executor. The result is then the same to the last bit.
 
 from __future__ import annotations
 
-import os
-import sys
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
-from dataclasses import replace
-from itertools import islice
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kfsheet.compiling import compiled_function, is_ready
-from kfsheet.ensemble import NEES, Draws, Study
+from kfsheet.ensemble import NEES, Draws, Study, check_mapping, is_whole
 from kfsheet.errors import DataError
 from kfsheet.evaluation import (
     check_data_name,
     checked_array,
     checked_parameters,
     facts_of,
-    source_of,
+    gaps_of,
 )
-from kfsheet.group import Found, Task, run_group
-from kfsheet.kernel import kernel_of
+from kfsheet.group import Found, Task
+from kfsheet.kernel import Kernel, kernel_of
+from kfsheet.quantiles import Kept
+from kfsheet.running import computed
+from kfsheet.source import python_source
 
 if TYPE_CHECKING:
+    from kfsheet.parts import Parameter
     from kfsheet.recurrence import Recurrence
 
 NUMBERS = 2**17  # of a group: as many as fit into the cache of a core
-FEWEST, MOST = 16, 2048  # members of a group
+MOST = 2048  # members of a group
 
 
 def study(
@@ -59,18 +58,21 @@ def study(
     members : int
         How many runs, from 1 up.
     data : mapping or Draws
-        Data columns: a vector for all members, an array (members, rows), or draws.
+        Data columns: a vector for all members, an array (members, rows), or draws, which may
+        hold further data.
     columns : sequence of str
         Columns of which statistics over the members are wanted, step by step.
     scalars : sequence of str, optional
         Scalars of which statistics over the members are wanted; all by default.
     quantiles : sequence of float
-        Quantiles of the scalars over the members, from 0 to 1. They need the scalars of all
-        members at once, 8 bytes each; nothing else grows with the number of members.
+        Quantiles of the scalars over the members, from 0 to 1, exact. The scalars of all members
+        are kept for them, beyond 8 MB in a temporary file: 8 bytes each, so ask with
+        ``scalars`` for those that matter. Nothing else grows with the number of members.
     nees : mapping of str to NEES
-        Further quantities, by a name of their own.
+        Further quantities, by names of their own.
     executor : Executor, optional
-        Who computes; threads on all cores by default. Processes need pickles of the arrays only.
+        Who computes; threads on all cores by default. It is handed functions of kfsheet and
+        arrays, so processes and other machines need kfsheet, and Numba if this one has it.
     parameters : mapping
         Values, or arrays of length ``members``.
     compiled : bool, optional
@@ -78,78 +80,134 @@ def study(
 
     Raises
     ------
+    ModelError
+        For columns that the model lacks.
     DataError
         For an unknown name, a shape that does not fit, a value that is not allowed, or a member
         whose computation has no value; the message names the member.
     """
-    if not isinstance(members, int) or members < 1:
-        raise DataError(f"members is {members!r}; give a whole number from 1 up")
-    if any(not 0 <= q <= 1 for q in quantiles):
-        raise DataError(f"quantiles are {quantiles!r}; each lies between 0 and 1")
-    names = [*dict.fromkeys(columns)]
-    for name in scalars or ():
-        if name not in {**model.derived_scalars, **model.summaries}:
-            raise DataError(f"{model.name} has no scalar {name}")
-    kept = None if scalars is None else tuple(scalars)
-    task = _first_task(model, members, data, names, kept, nees, parameters, compiled)
-    task = replace(task, keep=len(quantiles) > 0)
-    found = _computed(task, members, executor)
-    return _study(model, members, [*names, *nees], task.kernel.scalars, found, quantiles)
-
-
-def _first_task(
-    model: Recurrence,
-    members: int,
-    data: Mapping[str, Any] | Draws | None,
-    names: list[str],
-    scalars: tuple[str, ...] | None,
-    nees: Mapping[str, NEES],
-    parameters: Mapping[str, Any],
-    compiled: bool | None,
-) -> Task:
-    """The task of all members, to be cut into groups."""
-    facts = facts_of(model)
-    facts.wanted(model, names)
-    needed = list(names)
-    for spec in nees.values():
-        needed += [*spec.error_columns(), *spec.covariance_columns(model).values()]
-    wanted = tuple(dict.fromkeys(needed))
-    facts.wanted(model, wanted)
-    kernel = kernel_of(model, model.version, wanted, scalars)
-    place = {name: n for n, name in enumerate(kernel.columns)}
-    draws = data if isinstance(data, Draws) else None
-    series = dict(facts.default)
-    for name in draws.columns if draws else ():
-        check_data_name(name, series, model)
-    for name, values in ({} if draws else data or {}).items():
-        check_data_name(name, series, model)
-        series[name] = _member_data(model, name, values, members)
-    return Task(
+    members = _check_members(members)
+    columns, levels = _check_names("columns", columns), _check_quantiles(quantiles)
+    nees = _check_nees(model, nees)
+    if executor is not None and not hasattr(executor, "submit"):
+        raise DataError(f"executor is {executor!r}; give one of concurrent.futures, or its like")
+    given = data.data if isinstance(data, Draws) else check_mapping("data", data or {})
+    kernel, places = _kernel(model, columns, _check_scalars(model, scalars), nees)
+    shared, own = _parameters(model, parameters, members)
+    by_compiler = facts_of(model).study_is_compiled(kernel, members, compiled)
+    task = Task(
         kernel,
-        ""
-        if facts.study_is_compiled(kernel, members, compiled)
-        else source_of(model, model.version),
+        "" if by_compiler else python_source(model, [*kernel.columns, *kernel.scalars]),
         model.name,
-        facts.rows,
+        model.rows,
         0,
         members,
-        _member_parameters(model, parameters, members),
-        series,
-        draws,
-        tuple(place[name] for name in names),
-        tuple(
-            (
-                tuple(place[name] for name in spec.error_columns()),
-                tuple((*at, place[n]) for at, n in spec.covariance_columns(model).items()),
-            )
-            for spec in nees.values()
-        ),
+        min(max(NUMBERS // (model.rows * max(1, len(kernel.columns))), 1), MOST),
+        shared,
+        own,
+        _data(model, given, members),
+        _drawn(model, data) if isinstance(data, Draws) else None,
+        len(columns),
+        places,
+        keep=len(levels) > 0,
+        gaps=gaps_of(model, model.version),
     )
+    with Kept(len(kernel.scalars)) as kept:
+        found = computed(task, executor, kept)
+        lines = kept.quantiles(levels)
+    named = {
+        f"{repr(q).removesuffix('.0')} quantile": x for q, x in zip(levels, lines, strict=True)
+    }
+    return _study(model, [*columns, *nees], kernel.scalars, found, named)
+
+
+# -- what is asked for -----------------------------------------------------------------------
+
+
+def _check_members(members: Any) -> int:
+    if not is_whole(members) or members < 1:
+        raise DataError(f"members is {members!r}; give a whole number from 1 up")
+    return int(members)
+
+
+def _check_names(what: str, names: Any) -> list[str]:
+    if isinstance(names, str):
+        raise DataError(f"{what} is the text {names!r}; give a list: [{names!r}]")
+    return list(dict.fromkeys(names))
+
+
+def _check_scalars(model: Recurrence, names: Sequence[str] | None) -> tuple[str, ...] | None:
+    if names is None:
+        return None
+    known = {**model.derived_scalars, **model.summaries}
+    for name in (checked := _check_names("scalars", names)):
+        if name not in known:
+            has = f"it has {', '.join(known)}" if known else "it has none"
+            raise DataError(f"{model.name} has no scalar {name}; {has}")
+    return tuple(checked)
+
+
+def _check_quantiles(quantiles: Any) -> list[float]:
+    try:
+        levels = [float(q) for q in quantiles if not isinstance(q, str)]
+    except (TypeError, ValueError):
+        levels = None
+    if levels is None or isinstance(quantiles, str) or len(levels) < len(quantiles):
+        raise DataError(f"quantiles is {quantiles!r}; give a list of numbers: [0.05, 0.95]")
+    if not all(0 <= q <= 1 for q in levels):
+        raise DataError(f"quantiles are {levels}; each lies between 0 and 1")
+    return list(dict.fromkeys(levels))
+
+
+def _check_nees(model: Recurrence, nees: Any) -> dict[str, NEES]:
+    for name, spec in check_mapping("nees", nees).items():
+        if not isinstance(spec, NEES):
+            raise DataError(f"nees[{name!r}] is {spec!r}; give NEES(states)")
+        if name in facts_of(model).every:
+            raise DataError(f"nees[{name!r}]: {model.name} has a column of that name; take another")
+    return dict(nees)
+
+
+# -- what is computed ------------------------------------------------------------------------
+
+
+def _kernel(
+    model: Recurrence,
+    columns: list[str],
+    scalars: tuple[str, ...] | None,
+    nees: Mapping[str, NEES],
+) -> tuple[Kernel, tuple[tuple[tuple[int, ...], dict[tuple[int, int], int]], ...]]:
+    """The kernel, and for each NEES where it stores the errors and their covariance."""
+    specs = [(spec.error_columns(), spec.covariance_columns(model)) for spec in nees.values()]
+    needed = [*columns, *(name for e, P in specs for name in [*e, *P.values()])]
+    wanted = tuple(dict.fromkeys(facts_of(model).wanted(model, needed)))
+    kernel = kernel_of(model, model.version, wanted, scalars)
+    place = {name: n for n, name in enumerate(kernel.columns)}
+    return kernel, tuple(
+        (tuple(place[name] for name in e), {at: place[name] for at, name in P.items()})
+        for e, P in specs
+    )
+
+
+def _drawn(model: Recurrence, draws: Draws) -> Draws:
+    """The draws without the data that came with them."""
+    for name in draws.columns:
+        check_data_name(name, facts_of(model).default, model)
+    return Draws(*draws.columns, seed=draws.seed)
+
+
+def _data(model: Recurrence, given: Mapping[str, Any], members: int) -> dict[str, np.ndarray]:
+    """Data columns as arrays of shape (1 or members, rows)."""
+    series = dict(facts_of(model).default)
+    for name, values in given.items():
+        check_data_name(name, series, model)
+        series[name] = _member_data(model, name, values, members)
+    return series
 
 
 def _member_data(model: Recurrence, name: str, values: Any, members: int) -> np.ndarray:
     array = np.asarray(values)
-    if array.ndim != 2:
+    if array.ndim < 2:
         return checked_array(model, name, values)[None, :]
     if array.shape != (members, model.rows) or array.dtype.kind not in "fiu":
         raise DataError(
@@ -157,6 +215,9 @@ def _member_data(model: Recurrence, name: str, values: Any, members: int) -> np.
             "(members x rows), or one row for all members"
         )
     array = np.ascontiguousarray(array, dtype=float)
+    with np.errstate(over="ignore", invalid="ignore"):
+        if np.isfinite(array.sum()):
+            return array
     bad = ~np.isfinite(array)
     if model.table[name].may_be_missing:
         bad &= ~np.isnan(array)
@@ -166,111 +227,51 @@ def _member_data(model: Recurrence, name: str, values: Any, members: int) -> np.
     return array
 
 
-def _member_parameters(model: Recurrence, given: Mapping[str, Any], members: int) -> np.ndarray:
-    """Parameter values of shape (1 or members, parameters)."""
-    many = {n: np.asarray(v) for n, v in given.items() if np.ndim(v) == 1}
+def _parameters(
+    model: Recurrence, given: Mapping[str, Any], members: int
+) -> tuple[np.ndarray, dict[int, np.ndarray]]:
+    """Values for all members, and those of each, by number of the parameter."""
+    many = {name: values for name, values in given.items() if np.ndim(values) > 0}
     one = checked_parameters(model, {n: v for n, v in given.items() if n not in many})
-    table = np.tile(np.array([list(one.values())]), (members if many else 1, 1))
+    own = {}
     for name, values in many.items():
-        if name not in one or len(values) != members:
-            raise DataError(
-                f"parameter {name} has {len(values)} values for {members} members"
-                if name in one
-                else f"{model.name} has no parameter {name}; it has {', '.join(one)}"
-            )
-        checked = [
-            model.parameters[name].checked(v, f" of member {k}") for k, v in enumerate(values)
-        ]
-        table[:, list(one).index(name)] = checked
-    return table
+        if name not in one:
+            raise DataError(f"{model.name} has no parameter {name}; it has {', '.join(one)}")
+        if np.shape(values) != (members,):
+            size = " x ".join(map(str, np.shape(values)))
+            raise DataError(f"parameter {name} has {size} values for {members} members")
+        own[list(one).index(name)] = _member_values(model.parameters[name], values)
+    return np.array([*one.values()], dtype=float), own
 
 
-# -- computing -----------------------------------------------------------------------------
+def _member_values(parameter: Parameter, values: Any) -> np.ndarray:
+    """Values of a parameter for the members, checked quickly if they are plain numbers."""
+    array = np.asarray(values)
+    if array.dtype.kind in "fiu":
+        array = array.astype(float)
+        low = {"positive": np.nextafter(0, 1), "nonnegative": 0}.get(parameter.sign, -np.inf)
+        if np.isfinite(array).all() and (array >= low).all():
+            return array
+    return np.array([parameter.checked(v, f" of member {k}") for k, v in enumerate(values)])
 
 
-def _computed(task: Task, members: int, executor: Executor | None) -> Found:
-    if executor is not None:
-        return _gathered(task, members, executor)
-    workers = os.cpu_count() or 1
-    if task.compiled:
-        with _bar(members, "" if is_ready(task.kernel.source) else "compiling"):
-            compiled_function(task.kernel.source)
-    pool = ThreadPoolExecutor(workers)
-    try:
-        return _gathered(task, members, pool)
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _gathered(task: Task, members: int, executor: Executor) -> Found:
-    """What all groups say, in order, with few of them under way at a time."""
-    waiting = iter(_groups(task, members))
-    running = [executor.submit(run_group, t) for t in islice(waiting, 4 * (os.cpu_count() or 1))]
-    whole: Found | None = None
-    bar = _bar(members)
-    try:
-        while running:
-            found = running.pop(0).result()
-            running += [executor.submit(run_group, t) for t in islice(waiting, 1)]
-            bar.update(found.members)
-            if whole is None:
-                whole = found
-            else:
-                whole.add(found)
-    finally:
-        bar.close()
-        for future in running:
-            future.cancel()
-    assert whole is not None  # there is at least one member
-    return whole
-
-
-def _bar(members: int, text: str = "") -> Any:
-    from tqdm import tqdm
-
-    silent = not sys.stderr.isatty()
-    return tqdm(total=members, desc=text, unit=" runs", leave=False, disable=silent)
-
-
-def _groups(task: Task, members: int) -> Iterator[Task]:
-    size = NUMBERS // (task.rows * max(1, len(task.kernel.columns)))
-    size = min(max(size, FEWEST), MOST)
-    for first in range(0, members, size):
-        last = min(first + size, members)
-
-        def part(array: np.ndarray, first: int = first, last: int = last) -> np.ndarray:
-            return array if len(array) == 1 else array[first:last]
-
-        yield replace(
-            task,
-            first=first,
-            last=last,
-            parameters=part(task.parameters),
-            data={name: part(array) for name, array in task.data.items()},
-        )
-
-
-# -- the result ----------------------------------------------------------------------------
+# -- the result ------------------------------------------------------------------------------
 
 
 def _study(
     model: Recurrence,
-    members: int,
     names: list[str],
     scalars: tuple[str, ...],
     found: Found,
-    quantiles: Sequence[float],
+    quantiles: Mapping[str, np.ndarray],
 ) -> Study:
     import pandas as pd
 
+    index = pd.RangeIndex(model.rows, name=model.step)
+    tables = found.rows.statistics()
     rows = {
-        name: pd.DataFrame(
-            found.rows.statistics(k),
-            index=pd.RangeIndex(model.rows, name=model.step),
-        )
+        name: pd.DataFrame({key: values[k] for key, values in tables.items()}, index=index)
         for k, name in enumerate(names)
     }
-    table = pd.DataFrame(found.scalars.statistics(), index=scalars)
-    for q in quantiles:
-        table[f"{q:.4g} quantile"] = np.nanquantile(np.concatenate(found.kept), q, axis=0)
-    return Study(members, rows, table)
+    table = pd.DataFrame({**found.scalars.statistics(), **quantiles}, index=list(scalars))
+    return Study(found.members, rows, table)

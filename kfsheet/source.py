@@ -59,9 +59,11 @@ def _scalar_lines(scalars: Iterable[Scalar]) -> list[str]:
 def _table_lines(model: Recurrence, columns: list[Column]) -> list[str]:
     data = next((c.name for c in columns if c.is_data), None)
     formulas = [c.name for c in columns if not c.is_data]
+    rows = ["", f"    rows = {f'len({data})' if data else model.rows}"]
+    if not formulas:
+        return rows
     return [
-        "",
-        f"    rows = {f'len({data})' if data else model.rows}",
+        *rows,
         *_wrapped(", ".join(formulas) + ","),
         f"    ) = ([nan] * rows for _ in range({len(formulas)}))",
     ]

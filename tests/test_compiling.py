@@ -26,7 +26,6 @@ from kfsheet import (
     compiling,
     evaluate,
     evaluation,
-    members,
     t,
     warm_up,
     when_observed,
@@ -251,11 +250,16 @@ def test_a_machine_without_a_compiler_says_so(monkeypatch):
 
 
 def test_a_study_says_when_it_waits_for_the_compiler(monkeypatch, cache):
-    said, bar = [], members._bar
-    monkeypatch.setattr(members, "_bar", lambda n, text="": said.append(text) or bar(n, text))
+    said, bar = [], running._bar
+
+    def watched(members, shown, words=""):
+        said.extend([words] if shown else [])
+        return bar(members, shown, words)
+
+    monkeypatch.setattr(running, "_bar", watched)
     for _ in range(2):
         evaluate(small(), members=3, compiled=True)
-    assert said == ["compiling", "", "", ""]
+    assert said == ["compiling"]
 
 
 # -- on disk ---------------------------------------------------------------------------------
