@@ -32,7 +32,7 @@ test: $(READY)
 	$(BIN)/ruff check --quiet .
 	$(BIN)/ruff format --quiet --check .
 	$(BIN)/python -m pytest -n 2
-	$(BIN)/python -m pytest -o addopts= --nbval -n 2 --dist loadfile notebooks
+	TQDM_DISABLE=1 $(BIN)/python -m pytest -o addopts= --nbval -n 2 --dist loadfile notebooks
 
 format: $(READY)
 	$(BIN)/ruff check --fix .

@@ -7,6 +7,7 @@ cell tagged ``interactive`` (a widget, with random names) keeps no output and is
 runs it.
 """
 
+import os
 import sys
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from kfsheet.cli import progress
 from kfsheet.files import write_file
 
 FOLDER = Path(__file__).parents[1] / "notebooks"
+os.environ["TQDM_DISABLE"] = "1"  # a progress bar is no output that could be compared
 KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
 
 
