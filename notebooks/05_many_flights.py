@@ -58,6 +58,12 @@ ASKED = {"columns": [kind.format(name) for kind in KINDS for name in STATE] + ["
 ASKED |= {"nees": {"NEES": kf.NEES(STATE)}, "quantiles": (0.05, 0.5, 0.95)}
 
 
+# %% [markdown]
+# Now the flights. `fly` takes their number, the seed of their draws, and any parameter that is to
+# differ from the workbook's; what comes back is a study, with a table for each column.
+
+
+# %%
 def fly(members, seed=1, **changes):
     return kf.evaluate(
         m, kf.Draws("n_theta", "n_r", seed=seed), members=members, **ASKED, **changes
@@ -83,6 +89,11 @@ def overall(column):
     return float(np.sqrt((study.rows[column]["rms"][1:] ** 2).mean()))
 
 
+# %% [markdown]
+# The same from the claimed variances: their mean over flights and sweeps, and the root of that. For
+# an honest filter the two columns below agree.
+
+# %%
 real = [overall(f"e_{name}_a") for name in STATE]
 claimed = [float(study.rows[f"P_{n}{n}_a"]["mean"][1:].mean() ** 0.5) for n in STATE]
 pd.DataFrame({"real": real, "claimed": claimed}, index=STATE).round(2)
@@ -90,7 +101,8 @@ pd.DataFrame({"real": real, "claimed": claimed}, index=STATE).round(2)
 # %% [markdown]
 # Over the whole flight $x$ and $v_x$ agree to about one percent, $y$ errs 1.5 % less than claimed,
 # $v_y$ 6 % more. A mean over 132 s hides when.
-#
+
+# %% [markdown]
 # ## Sweep by sweep
 #
 # Three questions for every sweep. How large is the real error (rms), in multiples of the claimed
@@ -109,6 +121,11 @@ def measured(study):
     return pd.DataFrame(found)[1:]
 
 
+# %% [markdown]
+# We look at a few sweeps first: the very first, four from the first ten seconds, one in the middle
+# of the flight, and the last before the ball lands.
+
+# %%
 found = measured(study)
 found.loc[[1, 17, 33, 67, 100, 600, 1319]].T.round(3)
 
@@ -129,6 +146,11 @@ def chance(members):
     return table
 
 
+# %% [markdown]
+# With $N$ flights a root mean square is known to $1/\sqrt{2N}$ of itself, a share $p$ to
+# $\sqrt{p(1-p)/N}$, a mean of chi-squares with $k$ degrees of freedom to $\sqrt{2k/N}$:
+
+# %%
 chance(10_000).round(4)
 
 # %% [markdown]
@@ -152,6 +174,11 @@ def judged(found, members):
     return pd.DataFrame(table).astype({"first": "Int64", "last": "Int64"}).round(3)
 
 
+# %% [markdown]
+# Now the verdict on the ten thousand flights: ten figures of 1,319 sweeps each. By chance alone,
+# each figure would be outside in one or two sweeps, somewhere.
+
+# %%
 verdict = judged(found, 10_000)
 assert verdict["last"].max() < 130
 verdict
@@ -211,7 +238,8 @@ print(f"{len(above)} sweeps of {len(found)}, {len(above) / len(found):.0%}: 1 to
 # %% [markdown]
 # Five percent of the sweeps are outside 95 % bounds: as a share that looks like a pass. But they
 # are the first 67, all of them, and no other. Count where, not only how many.
-#
+
+# %% [markdown]
 # ## Is it the curvature?
 #
 # An extended filter takes the tangent for the curve. If that were the reason, a better start must
@@ -222,18 +250,22 @@ print(f"{len(above)} sweeps of {len(found)}, {len(above) / len(found):.0%}: 1 to
 START = pd.DataFrame(
     {kind: [m.parameters[f"{kind}_{n}"].value for n in STATE] for kind in "es"}, index=STATE
 )
-
-
-def start(factor, error=START["e"]):
-    changes = {f"e_{n}": factor * error[n] for n in STATE}
-    return changes | {f"s_{n}": factor * START.loc[n, "s"] for n in STATE}
-
-
 START
 
 # %% [markdown]
 # Both are one sigma in size, only their signs differ. Now with a tenth of both, over 4,000 flights.
 # If the curvature were to blame, nothing should be outside any more.
+
+
+# %%
+def start(factor, error=START["e"]):
+    changes = {f"e_{n}": factor * error[n] for n in STATE}
+    return changes | {f"s_{n}": factor * START.loc[n, "s"] for n in STATE}
+
+
+# %% [markdown]
+# The judgement of the smaller start. Its bounds are wider than before by the root of 10,000/4,000,
+# and yet the sweeps outside are more in number, and go on for longer.
 
 # %%
 tenth = measured(fly(4000, **start(0.1)))
@@ -244,7 +276,8 @@ judged(tenth, 4000).loc[["error y", "error vy", "coverage y", "NIS", "NEES"]]
 # On the contrary. In $y$ it now errs up to 33 % less than it claims, and the NEES rises to 4.44 and
 # is outside until 37.6 s. **It is not the curvature.** A better start matters for longer, since the
 # radar needs longer to better it.
-#
+
+# %% [markdown]
 # ## Is it the start?
 #
 # Look at that table again: every flight begins with *the same* error $b$, one sigma in each
@@ -262,6 +295,11 @@ def covariance(stage):
     return P
 
 
+# %% [markdown]
+# We need the covariance before and after each update, along one flight. Those of other flights are
+# nearly the same, since the covariance depends on the place of the ball, hardly on its noise.
+
+# %%
 P_a, P_f = covariance("a"), covariance("f")
 
 # %% [markdown]
@@ -274,6 +312,13 @@ F, A = np.array(kf.transition_matrix(DYNAMICS, 0.1), dtype=float), [np.eye(4)]
 for k in range(1, m.rows):
     A.append(P_a[k] @ np.linalg.inv(P_f[k]) @ F @ A[-1])
 A, b = np.array(A), START["e"].to_numpy()
+
+
+# %% [markdown]
+# For some sweeps, in metres and metres per second: the mean error over ten thousand flights, and
+# beside it what the algebra says is left of the start.
+
+# %%
 left = pd.DataFrame(A @ b, columns=STATE).add_suffix(", A b")
 mean = pd.DataFrame({n: study.rows[f"e_{n}_a"]["mean"] for n in STATE})
 left.join(mean).loc[[1, 17, 33, 67, 200], ["x", "x, A b", "y", "y, A b", "vy", "vy, A b"]].round(1)
@@ -282,7 +327,8 @@ left.join(mean).loc[[1, 17, 33, 67, 200], ["x", "x, A b", "y", "y, A b", "vy", "
 # The flights share an error: after 3.3 s the mean $v_y$ is still 25 m/s too large, as $A_k b$ says.
 # In $y$ it is soon gone: the ball is thought 305 m too low, but 30 m/s too fast upwards. At sweep 1
 # the two differ by 4 m, later by half a metre.
-#
+
+# %% [markdown]
 # The covariance of the real errors is then $P_a + A (b b' - P_0) A'$, and every figure of an error
 # and of the NEES follows from it without a single flight. We set them beside those of the ten
 # thousand.
@@ -296,6 +342,11 @@ def expected(b):
     return pd.DataFrame(found)[1:]
 
 
+# %% [markdown]
+# Smallest and largest value of each figure over the sweeps, as expected and as measured; the latter
+# also holds what chance adds, some two percent in a thousand sweeps.
+
+# %%
 theory = expected(b)
 both = {"expected": theory, "measured": found[theory.columns]}
 assert (theory - found)[ERRORS].abs().max().max() < 0.03
@@ -315,7 +366,8 @@ for frame, line in ((found, "-"), (theory, "--")):
 # %% [markdown]
 # They do, for the NEES a little lower than expected. **It is the start**: ten thousand flights with
 # one and the same error.
-#
+
+# %% [markdown]
 # But why is the claim too large for $y$, too small for $v_y$, and too small for all four together?
 # A filter expects not only sizes but company. Here are the correlations that it claims after four
 # seconds.
@@ -340,7 +392,8 @@ table.round(3)
 # Where $y$ and $v_y$ differ in sign the NEES is above 4 and $v_y$ errs more than claimed; where
 # they agree both are too small. An error of usual size in each direction can be an unusual one
 # altogether. The mean of all eight is 4 exactly: no start is typical, only their distribution is.
-#
+
+# %% [markdown]
 # ## A fair experiment
 #
 # So we give the world what the filter was promised: starts that are drawn, flight by flight, from
@@ -353,6 +406,11 @@ def drawn(members, seed=7):
     return {n: START.loc[n, "s"] * normal[i] for i, n in enumerate(STATE)}
 
 
+# %% [markdown]
+# Ten thousand flights with the same draws of the radar as before; only the start differs from
+# flight to flight. If the common start was to blame, nothing is outside any more.
+
+# %%
 fair = measured(fly(10_000, **start(1, drawn(10_000))))
 verdict = judged(fair, 10_000)
 assert not verdict["outside"].any()
@@ -372,7 +430,8 @@ for ax, limits in zip(axes, ((0.91, 1.1), (0.94, 1.002), (3.9, 4.2)), strict=Tru
 
 # %% [markdown]
 # All lines stay within their bands, at all times.
-#
+
+# %% [markdown]
 # ## Where the curvature does show
 #
 # An error of $\delta$ across the line of sight makes the range longer by $\delta^2/2r$. The filter,
@@ -389,16 +448,18 @@ pd.Series(arc, name="sagitta (m)").round(1)
 # starts again, with claims to match, a thousand flights for each factor (the first is as above).
 
 # %%
-wide = {k: measured(fly(1000, **start(k, drawn(1000)))) for k in FACTORS[1:]}
-table = pd.DataFrame({k: f[["NEES", "NIS"]].max() for k, f in everything.items()}).T
-table["NEES, last"] = [f["NEES"][1319] for f in (fair, *wide.values())]
+wide = {1: fair}
+wide |= {k: measured(fly(1000, **start(k, drawn(1000)))) for k in FACTORS[1:]}
+table = pd.DataFrame({k: f[["NEES", "NIS"]].max() for k, f in wide.items()}).T
+table["NEES, last"] = [f["NEES"][1319] for f in wide.values()]
 table.round(2)
 
 # %% [markdown]
 # At three times the error the NEES is 4.57 in its worst sweep, at five times 8.7, at ten times 81
 # and not mended at the end of the flight. Here the NIS tells, too. Our start, with a sagitta of 1.5
 # m, is far from that.
-#
+
+# %% [markdown]
 # ## What matters
 #
 # Which of the seventeen parameters matters? Each is raised by a tenth of itself; the two that are
@@ -445,6 +506,11 @@ def effects(*names):
     return table.round({"step": 3} | dict.fromkeys(SHOWN, 1)) + 0.0
 
 
+# %% [markdown]
+# The ball, the barrel, gravity, the clock and the radar, then. The position of the radar is moved
+# by 3,048 m downrange, and by 1,000 m upwards.
+
+# %%
 effects("v_0", "angle", "g", "dt", "x_R", "y_R", "sigma_theta", "sigma_r")
 
 # %% [markdown]
@@ -467,7 +533,8 @@ effects("s_x", "s_vx", "s_y", "s_vy", "Phi_s")
 # What it was told of the start changes errors by 0.2 % at most, but honesty by 3 %. And a distrust
 # of 0.1 m²/s³ that the world does not deserve costs more than anything else, 16 and 15 %. So how
 # does one find the right $\Phi_s$?
-#
+
+# %% [markdown]
 # ## Choosing q and r by likelihood
 #
 # A real radar comes without a label, and no truth tells errors. But a filter with wrong variances
@@ -486,6 +553,12 @@ def likelihood(echoes, q, *r):
     return kf.evaluate(m, kept, columns=["loglik", "NIS"], Phi_s=q, **deviations)
 
 
+# %% [markdown]
+# The likelihood is a sum over 1,319 echoes. The optimiser is a quasi-Newton method with bounds; it
+# starts from a first guess that is wrong by a factor of 5 for the angle and 3 for the range.
+
+
+# %%
 def fitted(echoes):
     def unlikely(logs):
         return -float(likelihood(echoes, *np.exp(logs))["loglik"].sum())
@@ -496,14 +569,21 @@ def fitted(echoes):
 
 
 # %% [markdown]
-# Twenty flights, each fitted by itself, from a first guess that is wrong by a factor of 5 and 3.
-# The world has no noise of motion, so the best $q$ is zero: a logarithm that would run away. We
-# stop it at $10^{-6}$.
+# Twenty flights, each fitted by itself, with all three parameters free at once. The world has no
+# noise of motion, so the best $q$ is zero: a logarithm that would run away. We stop it at
+# $10^{-6}$.
 
 # %%
 kf.warm_up(m, ["loglik", "NIS"])
 PARAMETERS = ["Phi_s", "sigma_theta", "sigma_r"]
 calm = pd.DataFrame([fitted(DRAWS.of(k, m.rows)) for k in range(20)], columns=PARAMETERS)
+
+
+# %% [markdown]
+# The errors of the radar first: how far, in percent, are the twenty estimates from the truth, on
+# average, and how much do they scatter from flight to flight?
+
+# %%
 percent = 100 * (calm[["sigma_theta", "sigma_r"]] / TRUE - 1)
 percent.agg(["mean", "std"]).round(1)
 
@@ -519,7 +599,8 @@ print(f"q below 0.0002 in {(found_q < 2e-4).sum()} of 20 flights, largest {found
 # %% [markdown]
 # Most flights give zero, as good as exactly, and none more than 0.003 m²/s³, a thirtieth of what
 # was costly above. An estimate at the edge of what is possible has no symmetric spread.
-#
+
+# %% [markdown]
 # A world with a known $q$ must be recognised too. Gusts push the ball about, white noise of $\Phi_s
 # = 1$ m²/s³ in both directions. The draws then hold the echo of where the ball really is; the
 # likelihood needs no truth.
@@ -530,6 +611,12 @@ ROOT = np.linalg.cholesky(np.array(q, dtype=float))
 place = one["x_true"].to_numpy() - reach + 1j * one["y_true"].to_numpy()
 
 
+# %% [markdown]
+# The path is the sum of the pushes, carried on by the transition. A complex number holds the place
+# of the ball as the radar sees it; its angle and its length give the change of the echo.
+
+
+# %%
 def gusty(member):
     pushes = np.random.RandomState((2, member)).standard_normal((m.rows, 4)) @ ROOT.T
     path = np.zeros((m.rows, 4))
@@ -540,6 +627,10 @@ def gusty(member):
     return DRAWS.of(member, m.rows) + moved / TRUE[:, None]
 
 
+# %% [markdown]
+# Twenty flights through gusts, with the same radar noise as the calm ones and the same first guess.
+# In multiples of the true values 1 m²/s³, 0.01 rad and 30.48 m:
+
 # %%
 windy = pd.DataFrame([fitted(gusty(k)) for k in range(20)], columns=PARAMETERS)
 (windy / [1, *TRUE]).agg(["median", "min", "max", "std"]).round(2)
@@ -548,7 +639,8 @@ windy = pd.DataFrame([fitted(gusty(k)) for k in range(20)], columns=PARAMETERS)
 # In multiples of the truth: $q$ has the median 1.04 and lies between 0.34 and 1.55. One flight
 # gives the radar's errors to 2 %, the noise of the motion to a third. The calm world and the gusty
 # one are never confused.
-#
+
+# %% [markdown]
 # ## Likelihood beside NIS
 #
 # The usual test of a filter without a truth is the mean NIS. Can it choose $q$? For 400 flights of
@@ -561,8 +653,13 @@ for k in range(400):
     lines.append([[run["loglik"].sum(), run["NIS"].mean()] for run in runs])
 L, NIS = np.array(lines).transpose(2, 1, 0)
 
+# %% [markdown]
+# For each filter: how much the likelihood changes on average against the filter that suspects
+# nothing, in what share of the flights it falls, the mean NIS, and its deviation from flight to
+# flight.
+
 # %%
-table = {"log L, mean change": (L - L[0]).mean(axis=1), "log L falls": (L < L[0]).mean(axis=1)}
+table = {"log L, mean change": (L - L[0]).mean(axis=1), "log L falls": (L[0] > L).mean(axis=1)}
 table |= {"mean NIS": NIS.mean(axis=1), "its spread": NIS.std(axis=1)}
 pd.DataFrame(table, index=pd.Index(SUSPECTED, name="Phi_s")).round(3)
 
@@ -570,7 +667,8 @@ pd.DataFrame(table, index=pd.Index(SUSPECTED, name="Phi_s")).round(3)
 # The likelihood falls in 93 % of the flights at $\Phi_s = 0.01$, in 99 % at 0.1. The mean NIS moves
 # from 1.997 to 1.984 at $\Phi_s = 1$, a quarter of its spread from flight to flight (0.055): one
 # flight's NIS cannot tell them apart. For choosing $q$, take the likelihood.
-#
+
+# %% [markdown]
 # ## The workbook among the flights
 #
 # The sheet's flight is one of the many. Where do its figures, as an independent spreadsheet engine
@@ -580,6 +678,13 @@ pd.DataFrame(table, index=pd.Index(SUSPECTED, name="Phi_s")).round(3)
 sheet = kf.recalculate("../workbooks/cannonball.xlsx")["Parameters"]
 names = {text: (row, column) for (row, column), text in sheet.items() if isinstance(text, str)}
 shown = ["rms_x_a", "rms_y_a", "rms_x_lin", "rms_y_lin", "mean_NIS"]
+
+
+# %% [markdown]
+# The first three columns come from the ten thousand flights, the last from the sheet. Five figures
+# that belong to one flight are not independent: both filters hear the same echoes.
+
+# %%
 table = study.scalars.loc[shown, ["0.05 quantile", "0.5 quantile", "0.95 quantile"]]
 table["sheet"] = [sheet[names[name][0], names[name][1] + 1] for name in shown]
 table.round(2)
@@ -587,7 +692,8 @@ table.round(2)
 # %% [markdown]
 # All within the middle nine tenths: a flight like others, a little lucky in $y$ and with large
 # innovations. No single flight could have shown what the ten thousand did.
-#
+
+# %% [markdown]
 # ## So, is it honest?
 #
 # **Yes, if the start is what the filter was promised.** Over 10,000 flights with drawn starts
@@ -599,7 +705,8 @@ table.round(2)
 # 4 % too large. The reason is the experiment, and the algebra of the linear filter predicts it; the
 # curvature needs a start that is three times as wrong. The NIS, the one test that needs no truth,
 # noticed none of this.
-#
+
+# %% [markdown]
 # ## Exercises
 #
 # **Routine**
