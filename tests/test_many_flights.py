@@ -99,13 +99,13 @@ def test_the_coverage_is_that_of_a_common_start():
     for k in range(flights):
         draws = dict(zip(DRAWS.columns, DRAWS.of(k, N), strict=True))
         error, variance = evaluate(cannonball, draws, columns=columns).to_numpy()[1:].T
-        inside = inside + (error**2 < 4 * variance) / flights
+        inside = inside + (error**2 < 4 * variance)
     P, A = passed_on()
     mean, claimed = (A @ B)[:, 3], np.sqrt(P[:, 3, 3])
     spread = np.sqrt((P - A @ P_0 @ A.swapaxes(1, 2))[:, 3, 3])
     share = norm.cdf((2 * claimed - mean) / spread) - norm.cdf((-2 * claimed - mean) / spread)
-    assert np.abs(inside - share).max() < 4.5 * math.sqrt(0.95 * 0.05 / flights)
-    assert inside[:10].min() == 1
+    assert np.abs(inside / flights - share).max() < 4.5 * math.sqrt(0.95 * 0.05 / flights)
+    assert inside[:10].min() == flights
     assert share[:10].min() > 0.9999
 
 
