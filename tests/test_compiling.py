@@ -26,6 +26,7 @@ from kfsheet import (
     compiling,
     evaluate,
     evaluation,
+    running,
     t,
     warm_up,
     when_observed,
