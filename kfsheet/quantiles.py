@@ -46,7 +46,8 @@ class Kept:
         self._file.seek(0)
         size = max(1, AT_ONCE // self.width) * self.width * 8
         while block := self._file.read(size):
-            yield np.frombuffer(block).reshape(-1, self.width)[:, k]
+            # A copy: a view would keep the whole block in memory as long as it lives.
+            yield np.frombuffer(block).reshape(-1, self.width)[:, k].copy()
 
     def quantiles(self, levels: Sequence[float]) -> np.ndarray:
         """Quantiles by linear interpolation, missing values left out: shape (levels, width)."""
@@ -95,7 +96,7 @@ def order_statistics(blocks: Callable[[], Iterable[np.ndarray]], ranks: Iterable
 
 
 def _splits(blocks: Callable[[], Iterable[np.ndarray]]) -> np.ndarray:
-    sample = [block[:: max(1, len(block) * 8 // SPLITS)] for block in blocks()]
+    sample = [block[:: max(1, len(block) * 8 // SPLITS)].copy() for block in blocks()]
     values = np.unique(np.concatenate(sample))
     values = values[~np.isnan(values)]
     return values[:: max(1, len(values) // SPLITS)]

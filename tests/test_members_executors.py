@@ -100,9 +100,10 @@ def test_this_process_may_use_no_more_cores_than_it_is_allowed():
 
 INTERRUPTED = """
 import signal, threading
-from kfsheet import Draws, evaluate, warm_up
+from kfsheet import Draws, evaluate
+from kfsheet.compiling import can_compile
 from kfsheet.exercises.cannonball import cannonball
-options = {"columns": ["NIS"], "scalars": ()}
+options = {"columns": ["NIS"], "scalars": (), "compiled": can_compile()}
 evaluate(cannonball, Draws("n_r"), members=1, **options)
 print("started", flush=True)
 try:
@@ -122,10 +123,14 @@ def test_an_interrupt_leaves_nothing_running():
         stderr=subprocess.PIPE,
         text=True,
     )
-    assert program.stdout.readline() == "started\n"
-    time.sleep(1)
-    program.send_signal(signal.SIGINT)
-    out, err = program.communicate(timeout=120)
+    try:
+        assert program.stdout.readline() == "started\n"
+        time.sleep(1)
+        program.send_signal(signal.SIGINT)
+        out, err = program.communicate(timeout=120)
+    finally:
+        program.kill()
+        program.communicate()
     assert out.split() == ["0", "5"]
     assert not err
     assert program.returncode == 0
@@ -194,7 +199,7 @@ def test_memory_stays_small_for_a_million_members_with_quantiles():
     used = [peak(FOOTBALLS.format(members=n), imports) for n in (100_000, 1_000_000)]
     assert max(used) < 500
     # All scalars of all members would be 144 MB more.
-    assert used[1] - used[0] < 100
+    assert used[1] - used[0] < 60
 
 
 @pytest.mark.skipif(not os.path.exists("/proc/self/status"), reason="no /proc to ask")
