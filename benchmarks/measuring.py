@@ -1,5 +1,6 @@
 """Times, as medians, and the lines of the table."""
 
+import os
 import subprocess
 import sys
 import time
@@ -40,7 +41,7 @@ def seconds(work: Callable[[], object], repeats: int = 5, calls: int = 1) -> flo
     return in_turn(work, repeats=repeats, calls=[calls])[0]
 
 
-def peak_memory(program: str) -> float:
+def peak_memory(program: str, **environment: str) -> float:
     """Megabytes that a program takes at most, in a process of its own."""
     ending = (
         "\nimport resource, sys\n"
@@ -48,5 +49,6 @@ def peak_memory(program: str) -> float:
         "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit)\n"
     )
     command = [sys.executable, "-c", program + ending]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    around = {**os.environ, **environment}
+    done = subprocess.run(command, env=around, capture_output=True, text=True, check=True)
     return float(done.stdout.split()[-1])
