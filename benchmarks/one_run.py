@@ -5,7 +5,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib.util import find_spec
 
 import flights
@@ -14,7 +13,6 @@ from flights import STATE
 from measuring import Line, in_turn
 
 import kfsheet as kf
-from kfsheet import evaluation
 from kfsheet.exercises.cannonball import cannonball
 from kfsheet.exercises.shuttlecock import joint_model, shuttlecock
 
@@ -51,9 +49,12 @@ def extended() -> Iterator[Line]:
     yield Line("one EKF: NumPy by hand", fast, times[1])
     if by_c:
         yield Line("one EKF: C by hand", fast, times[2], "0.67 (within 1.5 of C)")
-    with without_compiler():
-        ours()
-        yield Line("one EKF without a compiler: filterpy", *in_turn(ours, theirs), "2")
+
+    def by_python() -> object:
+        return kf.evaluate(cannonball, columns=STATE, compiled=False)
+
+    by_python()
+    yield Line("one EKF without a compiler: filterpy", *in_turn(by_python, theirs), "2")
     words = "in the background, then kept on disk"
     yield Line("compile four columns of the model", compile_time(STATE), 0, words)
     yield Line("compile all of its columns", compile_time(None), 0, words)
@@ -117,17 +118,6 @@ class Axis:
         self.mean = self.A @ run[AXIS].to_numpy()[0]
         start = np.diag(run[["P_xx_a", "P_vxvx_a", "P_axax_a"]].to_numpy()[0])
         self.P = self.A @ start @ self.A.T + self.Q
-
-
-@contextmanager
-def without_compiler() -> Iterator[None]:
-    """As on a machine that has no Numba."""
-    can = evaluation.can_compile
-    evaluation.can_compile = lambda: False
-    try:
-        yield
-    finally:
-        evaluation.can_compile = can
 
 
 def compile_time(columns: list[str] | None) -> float:

@@ -12,21 +12,18 @@ from __future__ import annotations
 
 import linecache
 import traceback
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import lru_cache
 from math import isinf
 from typing import TYPE_CHECKING, Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from kfsheet.compiling import LOADING, can_compile, compiled_function, pays
+from kfsheet.compiling import can_compile, compiled_function
 from kfsheet.errors import DataError
-from kfsheet.kernel import Kernel, kernel_of
-from kfsheet.parts import checked_values
-from kfsheet.schedule import needed
+from kfsheet.facts import Facts, facts_of, gaps_of
+from kfsheet.inputs import checked_data, checked_parameters
+from kfsheet.kernel import Kernel
 from kfsheet.source import python_source
 
 if TYPE_CHECKING:
@@ -166,108 +163,6 @@ def _run_python(
     return np.array([found[name] for name in wanted], dtype=float), scalars
 
 
-@dataclass
-class Facts:
-    """What every run of one version of a model needs, found once."""
-
-    rows: int
-    default: dict[str, np.ndarray]
-    units: dict[str, str]
-    every: tuple[str, ...]
-    frames: dict[tuple[str, ...], Any] = field(default_factory=dict)
-    widths: dict[tuple[str, ...], int] = field(default_factory=dict)
-    by_python: Counter = field(default_factory=Counter)
-    """Cells computed, for each choice of columns and each kernel of a study."""
-    kernels: dict[tuple[str, ...], Kernel] = field(default_factory=dict)
-    """Those whose machine code is there."""
-
-    def wanted(self, model: Recurrence, columns: Sequence[str] | None) -> tuple[str, ...]:
-        """Names of the columns to return, checked."""
-        if columns is None:
-            return self.every
-        for name in columns:
-            if name not in self.every:
-                model.column(name)  # raises an error that names those that there are
-        return tuple(columns)
-
-    def arrays(self, model: Recurrence, given: Mapping[str, Any]) -> dict[str, np.ndarray]:
-        """Data columns as arrays of shape (1, rows)."""
-        series = dict(self.default)
-        for name, values in given.items():
-            check_data_name(name, series, model)
-            series[name] = checked_array(model, name, values)[None, :]
-        return series
-
-    def kernel(
-        self, model: Recurrence, wanted: tuple[str, ...], compiled: bool | None
-    ) -> Kernel | None:
-        """The kernel of a single run, if that is for compiled code."""
-        if compiled is False:
-            return None
-        if wanted not in self.kernels:
-            before, cells = self.by_python[wanted], self._cells(model, wanted)
-            if not compiled and before + cells < LOADING:
-                self.by_python[wanted] += cells
-                return None
-            scalars = None if wanted == self.every else tuple(model.derived_scalars)
-            kernel = kernel_of(model, model.version, wanted, scalars)
-            if not compiled and not pays(kernel.source, cells, before):
-                self.by_python[wanted] += cells
-                return None
-            self.kernels[wanted] = kernel
-        return self.kernels[wanted]
-
-    def _cells(self, model: Recurrence, wanted: tuple[str, ...]) -> int:
-        """How many cells a run has."""
-        if wanted not in self.widths:
-            used = needed(model, (*wanted, *model.derived_scalars))
-            self.widths[wanted] = len(used.intersection(self.every))
-        return self.rows * self.widths[wanted]
-
-    def study_is_compiled(self, kernel: Kernel, members: int, compiled: bool | None) -> bool:
-        """Whether many runs are for compiled code, all of them."""
-        if compiled is not None:
-            return compiled
-        cells = members * self.rows * len(self.every)
-        if pays(kernel.source, cells, self.by_python[kernel]):
-            return True
-        self.by_python[kernel] += cells
-        return False
-
-    def frame(
-        self,
-        model: Recurrence,
-        wanted: tuple[str, ...],
-        out: np.ndarray,
-        values: dict[str, float],
-        scalars: dict[str, float],
-    ) -> pd.DataFrame:
-        """Numbers as a DataFrame, names and units with them."""
-        import pandas as pd
-
-        if wanted not in self.frames:
-            self.frames[wanted] = pd.Index(wanted), pd.RangeIndex(self.rows, name=model.step)
-        columns, index = self.frames[wanted]
-        frame = pd.DataFrame(out[: len(wanted)].T, index=index, columns=columns, copy=False)
-        frame.attrs = {"units": self.units, "parameters": values, "scalars": scalars}
-        return frame
-
-
-_FACTS: WeakKeyDictionary[Recurrence, tuple[int, Facts]] = WeakKeyDictionary()
-
-
-def facts_of(model: Recurrence) -> Facts:
-    """What every run of a model needs; found anew when something was added to it."""
-    version, facts = _FACTS.get(model, (None, None))
-    if version != model.version:
-        model.validate()
-        default = {c.name: np.array([c.values]) for c in model.all_columns() if c.is_data}
-        every = tuple(c.name for c in model.all_columns())
-        facts = Facts(model.rows, default, model.units(), every)
-        _FACTS[model] = (model.version, facts)
-    return facts
-
-
 def warm_up(model: Recurrence, columns: Sequence[str] | None = None) -> None:
     """Compile a model now, rather than after some runs; does nothing without Numba.
 
@@ -291,7 +186,7 @@ def run(
 ) -> tuple[dict[str, list[float]], dict[str, float], dict[str, float]]:
     """Columns, scalars and parameter values of one run by Python; see :func:`evaluate`."""
     values = checked_parameters(model, parameters or {})
-    series = _checked_data(model, data or {})
+    series = checked_data(model, data or {})
     function = _python_function(model, model.version, wanted)
     try:
         columns, scalars = function(**series, **values)
@@ -300,19 +195,6 @@ def run(
     if reason := without_value(columns, scalars, gaps_of(model, model.version)):
         raise DataError(f"{model.name}: {reason}")
     return columns, scalars, values
-
-
-@lru_cache(maxsize=32)
-def gaps_of(model: Recurrence, version: int) -> dict[str, np.ndarray]:
-    """Where a value may be missing: a vector over the rows for every column where one may."""
-    found = {}
-    for column in model.all_columns():
-        rows = np.full(model.rows, column.may_be_missing)
-        for row in range(min(len(column.start), model.rows)):
-            rows[row] = column.gap_possible(range(row, row + 1))
-        if rows.any():
-            found[column.name] = rows
-    return found
 
 
 def without_value(
@@ -331,50 +213,6 @@ def without_value(
         if isinf(value):
             return f"{name} is {value}, no finite number"
     return ""
-
-
-def checked_parameters(model: Recurrence, given: Mapping[str, Any]) -> dict[str, float]:
-    """Value of every parameter, those in ``given`` checked and put in."""
-    values = model.defaults()
-    for name, value in given.items():
-        if name not in values:
-            known = ", ".join(values)
-            raise DataError(f"{model.name} has no parameter {name}; it has {known}")
-        values[name] = model.parameters[name].checked(value)
-    return values
-
-
-def check_data_name(name: str, known: Mapping[str, Any], model: Recurrence) -> None:
-    """Refuse a data column that the model does not have."""
-    if name not in known:
-        raise DataError(f"{model.name} has no data column {name}; it has {', '.join(known)}")
-
-
-def checked_array(model: Recurrence, name: str, values: Any) -> np.ndarray:
-    """Values of a data column as an array, quickly if they are plain numbers."""
-    optional = model.table[name].may_be_missing
-    array = values if isinstance(values, np.ndarray) else np.asarray(values)
-    if array.ndim == 1 and array.dtype.kind in "fiu":
-        array = array.astype(float)
-        fine = np.isfinite(array) | (np.isnan(array) if optional else False)
-        if fine.all() and len(array) == model.rows:
-            return array
-    return np.array(_checked_column(model, name, values))
-
-
-def _checked_data(model: Recurrence, given: Mapping[str, Any]) -> dict[str, list[float]]:
-    series = {c.name: list(c.values) for c in model.all_columns() if c.is_data}
-    for name, values in given.items():
-        check_data_name(name, series, model)
-        series[name] = _checked_column(model, name, values)
-    return series
-
-
-def _checked_column(model: Recurrence, name: str, values: Any) -> list[float]:
-    column = list(checked_values(name, values, model.table[name].may_be_missing))
-    if len(column) != model.rows:
-        raise DataError(f"{name} has {len(column)} values; the table has {model.rows} rows")
-    return column
 
 
 @lru_cache(maxsize=32)

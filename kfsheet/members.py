@@ -16,14 +16,9 @@ import numpy as np
 
 from kfsheet.ensemble import NEES, Draws, Study, check_mapping, is_whole
 from kfsheet.errors import DataError
-from kfsheet.evaluation import (
-    check_data_name,
-    checked_array,
-    checked_parameters,
-    facts_of,
-    gaps_of,
-)
+from kfsheet.facts import facts_of, gaps_of
 from kfsheet.group import Found, Task
+from kfsheet.inputs import check_data_name, checked_array, checked_parameters
 from kfsheet.kernel import Kernel, kernel_of
 from kfsheet.quantiles import Kept
 from kfsheet.running import computed

@@ -26,6 +26,7 @@ from kfsheet import (
     compiling,
     evaluate,
     evaluation,
+    facts,
     running,
     t,
     warm_up,
@@ -35,6 +36,7 @@ from kfsheet.compiling import compiled_function, is_ready
 from kfsheet.errors import EngineError, WorkbookError
 from kfsheet.exercises.cannonball import cannonball
 from kfsheet.exercises.football import football
+from kfsheet.facts import facts_of
 from kfsheet.kernel import kernel_of
 
 pytest.importorskip("numba")
@@ -145,7 +147,7 @@ def test_after_some_runs_another_process_compiles_what_is_run_often_and_nothing_
     model, cells = unlike(2), ROWS * 2
     monkeypatch.setattr(compiling, "COMPILING", 5 * cells)
     monkeypatch.setattr(compiling, "LOADING", 2 * cells)
-    monkeypatch.setattr(evaluation, "LOADING", 2 * cells)
+    monkeypatch.setattr(facts, "LOADING", 2 * cells)
     for _ in range(4):
         evaluate(model)
     assert compilers == ([], [])
@@ -165,7 +167,7 @@ def test_who_asks_for_much_waits_and_who_says_so_never_or_always(compilers, monk
     source = kernel_of(model, model.version, ("v", "w")).source
     monkeypatch.setattr(compiling, "WAITING", ROWS * 2)
     monkeypatch.setattr(compiling, "LOADING", 0)
-    monkeypatch.setattr(evaluation, "LOADING", 0)
+    monkeypatch.setattr(facts, "LOADING", 0)
     evaluate(model, compiled=False)
     evaluate(model, members=2, compiled=False)
     assert compilers == ([], [])
@@ -181,10 +183,10 @@ def test_python_goes_on_until_the_other_process_is_done(monkeypatch):
     model = unlike(4)
     monkeypatch.setattr(compiling, "COMPILING", 1)
     monkeypatch.setattr(compiling, "LOADING", 1)
-    monkeypatch.setattr(evaluation, "LOADING", 1)
+    monkeypatch.setattr(facts, "LOADING", 1)
     python = evaluate(model, compiled=False)
     end, runs = time.monotonic() + 120, 0
-    while not evaluation.facts_of(model).kernels and time.monotonic() < end:
+    while not facts_of(model).kernels and time.monotonic() < end:
         assert_same(evaluate(model), python, 1e-13)
         runs += 1
     assert runs > 1
@@ -198,7 +200,7 @@ def test_a_compiler_that_fails_is_told_of_once_and_python_goes_on(monkeypatch):
     monkeypatch.setattr(compiling, "_BACKGROUND", background)
     for name in ("LOADING", "COMPILING"):
         monkeypatch.setattr(compiling, name, 1)
-    monkeypatch.setattr(evaluation, "LOADING", 1)
+    monkeypatch.setattr(facts, "LOADING", 1)
     evaluate(model)
     background._process.wait()
     with pytest.warns(RuntimeWarning, match="the compiler failed, so Python goes on"):
