@@ -100,6 +100,7 @@ def test_this_process_may_use_no_more_cores_than_it_is_allowed():
 
 INTERRUPTED = """
 import signal, threading
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it
 from kfsheet import Draws, evaluate
 from kfsheet.compiling import can_compile
 from kfsheet.exercises.cannonball import cannonball

@@ -19,7 +19,6 @@ from kfsheet.cli import progress
 from kfsheet.files import write_file
 
 FOLDER = Path(__file__).parents[1] / "notebooks"
-os.environ["TQDM_DISABLE"] = "1"  # a progress bar is no output that could be compared
 KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
 
 
@@ -52,7 +51,8 @@ def executed(source: Path) -> nbformat.NotebookNode:
         resources={"metadata": {"path": str(FOLDER)}},
         extra_arguments=["--IPKernelApp.log_level=40"],  # errors only
     )
-    client.execute()
+    # A progress bar is no output that could be compared.
+    client.execute(env={**os.environ, "TQDM_DISABLE": "1"})
     for cell in notebook.cells:
         cell.metadata.pop("execution", None)
     for cell, text in zip(widgets, sources, strict=True):
