@@ -197,11 +197,20 @@ def run(
     return columns, scalars, values
 
 
+def _suspicious(columns: Mapping[str, list]) -> list[tuple[str, list]]:
+    """Columns that hold something else than finite numbers; all are looked at together."""
+    table = np.array(list(columns.values()))
+    if table.dtype.kind != "f" or table.ndim != 2:
+        return list(columns.items())
+    fine = np.isfinite(table).all(axis=1)
+    return [item for item, good in zip(columns.items(), fine, strict=True) if not good]
+
+
 def without_value(
     columns: Mapping[str, list], scalars: Mapping[str, float], gaps: Mapping[str, np.ndarray]
 ) -> str:
     """What is infinite, complex, or NaN though nothing was missing; '' if nothing is."""
-    for name, column in columns.items():
+    for name, column in _suspicious(columns):
         array = np.array(column)
         bad = np.iscomplex(array) | ~np.isfinite(array)
         if bad.any() and name in gaps:
