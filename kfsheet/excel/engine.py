@@ -11,8 +11,10 @@ import subprocess
 import sys
 import tempfile
 import weakref
+from contextlib import suppress
 from itertools import starmap
 from pathlib import Path
+from typing import Any, BinaryIO
 
 from kfsheet.errors import EngineError, KfsheetError, WorkbookError
 from kfsheet.excel.stripping import Changes, strip_values
@@ -105,21 +107,31 @@ class Apart:
             sheet: {cell: value if value is None else float(value) for cell, value in cells.items()}
             for sheet, cells in (changes or {}).items()
         }
-        try:
-            marshal.dump(plain, self._process.stdin)
-            self._process.stdin.flush()
-        except OSError:
-            pass  # it has ended; the answer will say so
+        with suppress(OSError):  # it has ended; the answer will say so
+            _send(self._process.stdin, plain)
 
     def answer(self) -> Values:
         """Values of all cells that are not empty."""
         try:
-            kind, found = marshal.load(self._process.stdout)
-        except (EOFError, ValueError, TypeError):
+            kind, found = _received(self._process.stdout)
+        except EOFError:
             raise EngineError(f"IronCalc ended while it calculated {self.path}") from None
         if kind != "values":
             raise {"WorkbookError": WorkbookError}.get(kind, EngineError)(found)
         return found
+
+
+def _send(pipe: BinaryIO, value: object) -> None:
+    content = marshal.dumps(value)
+    pipe.write(len(content).to_bytes(8, "little") + content)
+    pipe.flush()
+
+
+def _received(pipe: BinaryIO) -> Any:
+    """What was sent; all of it is read at once, since marshal.load asks for every few bytes."""
+    head = pipe.read(8)
+    content = pipe.read(int.from_bytes(head, "little")) if len(head) == 8 else b""
+    return marshal.loads(content)  # EOFError where the other side has ended
 
 
 def _end(process: subprocess.Popen) -> None:
@@ -132,7 +144,7 @@ def main(path: str) -> None:
     engine: IronCalc | None = None
     while True:
         try:
-            changes = marshal.load(sys.stdin.buffer)
+            changes = _received(sys.stdin.buffer)
         except EOFError:
             return
         try:
@@ -140,8 +152,7 @@ def main(path: str) -> None:
             answer = ("values", engine.values(changes))
         except KfsheetError as error:
             answer = (type(error).__name__, str(error))
-        marshal.dump(answer, sys.stdout.buffer)
-        sys.stdout.buffer.flush()
+        _send(sys.stdout.buffer, answer)
 
 
 if __name__ == "__main__":
