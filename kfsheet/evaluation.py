@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import linecache
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache
-from math import isinf
+from math import isfinite, isinf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -197,13 +197,15 @@ def run(
     return columns, scalars, values
 
 
-def _suspicious(columns: Mapping[str, list]) -> list[tuple[str, list]]:
-    """Columns that hold something else than finite numbers; all are looked at together."""
-    table = np.array(list(columns.values()))
-    if table.dtype.kind != "f" or table.ndim != 2:
-        return list(columns.items())
-    fine = np.isfinite(table).all(axis=1)
-    return [item for item, good in zip(columns.items(), fine, strict=True) if not good]
+def _suspicious(columns: Mapping[str, list]) -> Iterator[tuple[str, list]]:
+    """Columns that may hold something else than finite numbers: then their sum is none either."""
+    for name, column in columns.items():
+        try:
+            fine = isfinite(sum(column, 0.0))
+        except (OverflowError, TypeError):  # of endless integers, of complex numbers
+            fine = False
+        if not fine:
+            yield name, column
 
 
 def without_value(
