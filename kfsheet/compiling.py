@@ -217,9 +217,8 @@ def _typed(function: Any) -> Any:
 
     given = types.Array(types.float64, 2, "C", readonly=True)
     out, results = types.float64[:, :, ::1], types.float64[:, ::1]
-    series = (
-        function.py_func.__code__.co_argcount - 5
-    )  # two numbers, parameters, and what it writes
+    # Besides data: two numbers, the parameters, and the two arrays that it writes.
+    series = function.py_func.__code__.co_argcount - 5
     function.compile((int64, int64, *[given] * (1 + series), out, results))
     function.disable_compile()  # arrays that may be written do as well; not once more for them
     return function

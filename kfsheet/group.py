@@ -128,13 +128,7 @@ def _run_compiled(
     out: np.ndarray,
     results: np.ndarray,
 ) -> None:
-    try:
-        function = compiled_function(task.kernel.source)
-    except ImportError:
-        raise DataError(
-            "a worker lacks Numba, which the process that asked has, and would compute other "
-            "last digits; install kfsheet[fast] for all of them"
-        ) from None
+    function = compiled_function(task.kernel.source)
     series = [data[name] for name in task.kernel.data]
     try:
         function(0, len(out), parameters, *series, out, results)

@@ -7,6 +7,7 @@ keeps in registers. :mod:`kfsheet.compiling` makes machine code of it.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -61,6 +62,15 @@ class _Printer(PythonPrinter):
         self._branches = 0
         self._hiding = 0  # depth inside what may turn an infinite value into a finite one
 
+    @contextmanager
+    def _inside(self) -> Iterator[None]:
+        """Prints what may turn an infinite value into a finite one."""
+        self._hiding += 1
+        try:
+            yield
+        finally:
+            self._hiding -= 1
+
     def _print_Indexed(self, expr: Indexed) -> str:
         return self._source.cell(str(expr.base.label), int(lag(expr)))
 
@@ -69,26 +79,19 @@ class _Printer(PythonPrinter):
 
     def _print_Piecewise(self, expr: Expr) -> str:
         self._branches += 1
-        self._hiding += 1
         try:
-            return super()._print_Piecewise(expr)
+            with self._inside():
+                return super()._print_Piecewise(expr)
         finally:
             self._branches -= 1
-            self._hiding -= 1
 
     def _denominator(self, factors: list[Expr]) -> str:
-        self._hiding += 1
-        try:
+        with self._inside():
             return super()._denominator(factors)
-        finally:
-            self._hiding -= 1
 
     def _call(self, name: str, *arguments: Expr) -> str:
-        self._hiding += 1
-        try:
+        with self._inside():
             return super()._call(name, *arguments)
-        finally:
-            self._hiding -= 1
 
     def _print_Pow(self, expr: Expr) -> str:
         if expr.exp.is_Integer or (-2 * expr.exp).is_Integer:

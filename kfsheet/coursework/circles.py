@@ -5,10 +5,10 @@ from __future__ import annotations
 from openpyxl.utils import get_column_letter
 from sympy import Indexed
 
+from kfsheet.coursework.arithmetic import cell_of
 from kfsheet.coursework.meaning import Interpreter
 from kfsheet.coursework.places import Places
 from kfsheet.errors import ForbiddenError, FormulaError
-from kfsheet.expressions import lag
 
 MOST = 500  # cells that are looked at
 
@@ -47,10 +47,6 @@ def _read_by(interpreter: Interpreter, places: Places, name: str, step: int) -> 
         return []
     model, e = interpreter.model, meaning.expression
     scalars = {(s.name, 0) for s in e.free_symbols if s.name in model.derived_scalars}
-    cells = {(str(c.base.label), _step(c, step)) for c in e.atoms(Indexed)}
+    read = map(cell_of, e.atoms(Indexed))
+    cells = {(column, place if fixed else step - place) for column, fixed, place in read}
     return sorted(scalars | {n for n in cells if n[0] in model.table and 0 <= n[1] < model.rows})
-
-
-def _step(cell: Indexed, step: int) -> int:
-    index = cell.indices[0]
-    return int(index) if index.is_Integer else step - int(lag(cell))

@@ -61,7 +61,7 @@ def _formulas(exercise: Exercise, book: Book, places: Places) -> Iterator[str]:
     asked = {q.name for q in exercise.questions}
     interpreter = Interpreter(book, places)
     original = _original(exercise)
-    unmoved = original.places.columns == places.columns
+    unmoved = original.places.tables == places.tables
     unmoved &= original.places.scalars == places.scalars
     for column in exercise.model.table.values():
         if column.is_data or column.name in asked or column.section in exercise.frozen:
