@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from sympy import Add, Expr, Indexed, Mul, Piecewise, Pow
+from sympy import Add, Expr, Indexed, Mul, Piecewise, Pow, S
 
 from kfsheet.checks import columns_read
 from kfsheet.expressions import Missing, column_references, lag
@@ -22,6 +22,9 @@ from kfsheet.schedule import Pass, needed
 if TYPE_CHECKING:
     from kfsheet.parts import Column
     from kfsheet.recurrence import Recurrence
+
+CHEAP = ("**", "abs", "observed", "sign")
+"""Calls, and the power of a whole number, that are plain arithmetic to a processor."""
 
 
 @dataclass(frozen=True)
@@ -50,13 +53,13 @@ def kernel_of(
     every = {**model.derived_scalars, **model.summaries}
     scalars = tuple(every) if scalars is None else scalars
     columns = tuple(c.name for c in model.all_columns()) if columns is None else columns
-    return _Source(model, columns, scalars).kernel()
+    return KernelSource(model, columns, scalars).kernel()
 
 
 class _Printer(PythonPrinter):
     """A cell of this row is a local variable, one of a row before is another."""
 
-    def __init__(self, source: _Source) -> None:
+    def __init__(self, source: KernelSource) -> None:
         super().__init__()
         self._source = source
         self._branches = 0
@@ -87,23 +90,29 @@ class _Printer(PythonPrinter):
 
     def _denominator(self, factors: list[Expr]) -> str:
         with self._inside():
-            return super()._denominator(factors)
+            text = super()._denominator(factors)
+        self._source.divide(factors, text, bool(self._branches))
+        return text
 
     def _call(self, name: str, *arguments: Expr) -> str:
         with self._inside():
-            return super()._call(name, *arguments)
+            text = super()._call(name, *arguments)
+        return self._source.call(name, arguments, text, bool(self._branches))
 
     def _print_Pow(self, expr: Expr) -> str:
-        if expr.exp.is_Integer or (-2 * expr.exp).is_Integer:
-            text = super()._print_Pow(expr)
+        exponent = expr.exp
+        if exponent.is_Number and exponent < 0:
+            return super()._print_Pow(expr)  # a division
+        if not exponent.is_Integer and exponent != S.Half:
+            return self._call("power", expr.base, exponent)
+        name, text = "sqrt" if exponent == S.Half else "**", super()._print_Pow(expr)
+        if self._hiding:
             # Python refuses a power that overflows; in a sum it is seen at the end of the row.
-            return f"bounded({text})" if self._hiding and expr.exp.is_positive else text
-        text = self._call("power", expr.base, expr.exp)
-        # In a branch that is not taken it may have no value, so it stays there.
-        return text if self._branches else self._source.once(expr, text)
+            name, text = "bounded", f"bounded({text})"
+        return self._source.call(name, (expr,), text, bool(self._branches))
 
 
-class _Source:
+class KernelSource:
     """Writes the kernel of a model, leaving out what nothing wanted needs."""
 
     def __init__(
@@ -120,6 +129,7 @@ class _Source:
         self._code = _Printer(self).doprint
 
     def kernel(self) -> Kernel:
+        """The kernel, and what it takes and stores."""
         parameters = tuple(self.model.parameters)
         columns = self.model.table.values()
         data = tuple(c.name for c in columns if c.is_data and c.name in self.needed)
@@ -128,26 +138,45 @@ class _Source:
         self._in_rows = True
         body = list(self._body())
         fixed += [f"        {name} = {text}" for text, name in self._once.items()]
-        lines = [*self._head(data, fixed), *self._member(data), *body, *self._tail()]
-        source = "\n".join([PRELUDE, *lines, ""])
+        source = "\n".join([PRELUDE, *self._lines(data, fixed, body), ""])
         return Kernel(source, parameters, data, tuple(self.stored), self.scalars)
 
     def cell(self, name: str, back: int) -> str:
         """A column in this row or in one before."""
-        column = self.model.column(name)
         row = f"t - {back}" if back else "t"
-        if column.is_data:
-            return f"{name}[{row}]"
+        if self.model.column(name).is_data:
+            return self.datum(name, back)
         if self.level[name] < self.now:
             return f"kfsheet_out[{self.stored[name]}, {row}]"
+        return self.before(name, back)
+
+    def datum(self, name: str, back: int) -> str:
+        """A datum of this row or of one before."""
+        return f"{name}[{f't - {back}' if back else 't'}]"
+
+    def before(self, name: str, back: int) -> str:
+        """What a row before has handed on; of this row, its local variable."""
         return f"kfsheet_{back}_{name}" if back else name
 
-    def once(self, expression: Expr, text: str) -> str:
-        """A costly value that is the same in every row is computed before the first one."""
-        fixed = {*self.model.parameters, *self.model.derived_scalars}
-        if not self._in_rows or {s.name for s in expression.free_symbols} - fixed:
+    def place(self, name: str) -> str:
+        """Where a column that is stored leaves its value of this row."""
+        return f"kfsheet_out[{self.stored[name]}, t]"
+
+    def call(self, name: str, arguments: Sequence[Expr], text: str, in_branch: bool) -> str:
+        """A call, computed before the first row if it is costly and the same in every row."""
+        # In a branch that is not taken it may have no value, so it stays there.
+        if name in CHEAP or in_branch or not self.is_fixed(arguments):
             return text
         return self._once.setdefault(text, f"kfsheet_once_{len(self._once)}")
+
+    def divide(self, factors: Sequence[Expr], text: str, in_branch: bool) -> None:
+        """Told of every division: by which factors, as which text."""
+
+    def is_fixed(self, expressions: Sequence[Expr]) -> bool:
+        """Whether expressions in a row have the same value in every row."""
+        fixed = {*self.model.parameters, *self.model.derived_scalars}
+        names = {s.name for e in expressions for s in e.free_symbols}
+        return self._in_rows and names <= fixed
 
     def whole(self, name: str) -> str:
         """A column as an array, for an aggregate."""
@@ -168,14 +197,14 @@ class _Source:
 
     # -- lines -------------------------------------------------------------------------------
 
+    def _lines(self, data: tuple[str, ...], fixed: list[str], body: list[str]) -> list[str]:
+        good = "        kfsheet_bad = kfsheet_fixed"
+        return [*self._head(data, fixed), good, *self._member(data), *body, *self._tail()]
+
     def _head(self, data: tuple[str, ...], fixed: list[str]) -> list[str]:
         """What follows from the parameters, computed once where all members share them."""
-        # Everything of ours begins with kfsheet_, which no name of a model does.
-        names = "".join(f"kfsheet_all_{name}, " for name in data)
         return [
-            "def kernel(kfsheet_first, kfsheet_last, kfsheet_ps, "
-            f"{names}kfsheet_outs, kfsheet_rs):",
-            "    rows = kfsheet_outs.shape[2]",
+            *self._definition(data),
             "    for kfsheet_k in range(kfsheet_first, kfsheet_last):",
             "        if kfsheet_k == kfsheet_first or kfsheet_ps.shape[0] > 1:",
             "            kfsheet_p = kfsheet_ps[min(kfsheet_k, kfsheet_ps.shape[0] - 1)]",
@@ -185,11 +214,17 @@ class _Source:
             "            kfsheet_fixed = kfsheet_bad",
         ]
 
-    def _member(self, data: tuple[str, ...]) -> list[str]:
-        lines = [
-            "        kfsheet_bad = kfsheet_fixed",
-            "        kfsheet_out = kfsheet_outs[kfsheet_k - kfsheet_first]",
+    def _definition(self, data: tuple[str, ...]) -> list[str]:
+        # Everything of ours begins with kfsheet_, which no name of a model does.
+        names = "".join(f"kfsheet_all_{name}, " for name in data)
+        return [
+            "def kernel(kfsheet_first, kfsheet_last, kfsheet_ps, "
+            f"{names}kfsheet_outs, kfsheet_rs):",
+            "    rows = kfsheet_outs.shape[2]",
         ]
+
+    def _member(self, data: tuple[str, ...]) -> list[str]:
+        lines = ["        kfsheet_out = kfsheet_outs[kfsheet_k - kfsheet_first]"]
         for name in data:
             every = f"kfsheet_all_{name}"
             lines.append(f"        {name} = {every}[min(kfsheet_k, {every}.shape[0] - 1)]")
@@ -207,24 +242,27 @@ class _Source:
     def _body(self) -> Iterator[str]:
         for number, step in enumerate(self.passes):
             self.now = number
-            rows = [[c for c in row if c.name in self.needed] for row in step.rows]
-            yield from self._rows(Pass(tuple(map(tuple, rows)), step.summaries))
+            yield from self._rows(self._rows_of(step))
             yield from self._scalar_lines(s for s in step.summaries if s.name in self.needed)
 
-    def _rows(self, step: Pass) -> Iterator[str]:
+    def _rows_of(self, step: Pass) -> list[list[Column]]:
+        """The columns that are needed, row by row."""
+        return [[c for c in row if c.name in self.needed] for row in step.rows]
+
+    def _rows(self, rows: list[list[Column]]) -> Iterator[str]:
         """The start rows one by one, then the loop; lags are shifted at the end of each row."""
-        general = step.rows[-1]
+        *starts, general = rows
         if not general:
             return
         depth = self._depths(general)
         for name, deepest in depth.items():
             for back in range(1, deepest + 1):
-                yield f"        kfsheet_{back}_{name} = nan"
-        for row, columns in enumerate(step.rows[:-1]):
+                yield f"        {self.before(name, back)} = nan"
+        for row, columns in enumerate(starts):
             yield f"        t = {row}"
             yield from self._one_row(columns, row, depth, " " * 8)
             yield from self._test(columns, row, " " * 8)
-        loop = len(step.rows) - 1
+        loop = len(starts)
         yield f"        for t in range({loop}, rows):"
         yield from self._one_row(general, loop, depth, " " * 12)
         # What is infinite makes those infinite that carry it, up to the end of the table.
@@ -242,19 +280,18 @@ class _Source:
         yield f"{indent}kfsheet_bad += {_balanced(tests) if tests else 0.0}"
 
     def _one_row(
-        self, columns: tuple[Column, ...], row: int, depth: dict[str, int], indent: str
+        self, columns: Sequence[Column], row: int, depth: dict[str, int], indent: str
     ) -> Iterator[str]:
         for column in columns:
             rule = column.definition(row)
             yield f"{indent}{column.name} = float({self._code(rule)})"
             if column.name in self.stored:
-                yield f"{indent}kfsheet_out[{self.stored[column.name]}, t] = {column.name}"
+                yield f"{indent}{self.place(column.name)} = {column.name}"
         for name, deepest in depth.items():
             for back in range(deepest, 0, -1):
-                source = f"kfsheet_{back - 1}_{name}" if back > 1 else name
-                yield f"{indent}kfsheet_{back}_{name} = {source}"
+                yield f"{indent}{self.before(name, back)} = {self.before(name, back - 1)}"
 
-    def _depths(self, columns: tuple[Column, ...]) -> dict[str, int]:
+    def _depths(self, columns: Sequence[Column]) -> dict[str, int]:
         """How far back each column of this pass is read."""
         depth: dict[str, int] = {}
         for column in columns:
@@ -311,6 +348,8 @@ def _balanced(terms: list[str]) -> str:
 PRELUDE = '''"""Generated by kfsheet; this file may be deleted at any time."""
 
 from math import asinh, atan, atan2, ceil, cos, floor, isnan, nan, pi, sin, tan, tanh
+
+from numpy import empty
 
 from kfsheet.fastmath import (
     acos, acosh, asin, atanh, bounded, cosh, count, exp, largest, last, log, mean, observed,

@@ -8,7 +8,7 @@ executor. The result is then the same to the last bit.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,7 @@ from kfsheet.facts import facts_of, gaps_of
 from kfsheet.group import Found, Task
 from kfsheet.inputs import check_data_name, checked_array, checked_parameters
 from kfsheet.kernel import Kernel, kernel_of
+from kfsheet.lanes import kernel_for_many
 from kfsheet.quantiles import Kept
 from kfsheet.running import computed
 from kfsheet.source import python_source
@@ -87,8 +88,9 @@ def study(
     if executor is not None and not hasattr(executor, "submit"):
         raise DataError(f"executor is {executor!r}; give one of concurrent.futures, or its like")
     given = data.data if isinstance(data, Draws) else check_mapping("data", data or {})
-    kernel, places = _kernel(model, columns, _check_scalars(model, scalars), nees)
+    scalars = _check_scalars(model, scalars)
     shared, own = _parameters(model, parameters, members)
+    kernel, places = _kernel(model, columns, scalars, nees, kernel_of if own else kernel_for_many)
     by_compiler = facts_of(model).study_is_compiled(kernel, members, compiled)
     task = Task(
         kernel,
@@ -171,12 +173,13 @@ def _kernel(
     columns: list[str],
     scalars: tuple[str, ...] | None,
     nees: Mapping[str, NEES],
+    printed: Callable[..., Kernel],
 ) -> tuple[Kernel, tuple[tuple[tuple[int, ...], dict[tuple[int, int], int]], ...]]:
     """The kernel, and for each NEES where it stores the errors and their covariance."""
     specs = [(spec.error_columns(), spec.covariance_columns(model)) for spec in nees.values()]
     needed = [*columns, *(name for e, P in specs for name in [*e, *P.values()])]
     wanted = tuple(dict.fromkeys(facts_of(model).wanted(model, needed)))
-    kernel = kernel_of(model, model.version, wanted, scalars)
+    kernel = printed(model, model.version, wanted, scalars)
     place = {name: n for n, name in enumerate(kernel.columns)}
     return kernel, tuple(
         (tuple(place[name] for name in e), {at: place[name] for at, name in P.items()})

@@ -64,8 +64,16 @@ def single(model, columns, scalars, data, **parameters):
     return run[columns].to_numpy().T, [run.attrs["scalars"][name] for name in scalars]
 
 
-@pytest.mark.parametrize("model", [football, cannonball], ids=["football", "cannonball"])
-def test_members_are_the_single_runs_bit_for_bit(monkeypatch, model):
+@pytest.mark.parametrize(
+    ("model", "columns", "own"),
+    [
+        (football, [], {"r_i": np.linspace(1, 100, MANY)}),
+        (football, ["x_a", "z_a", "d_i"], {}),  # side by side
+        (cannonball, [], {}),
+    ],
+    ids=["football", "football side by side", "cannonball"],
+)
+def test_members_are_the_single_runs_bit_for_bit(monkeypatch, model, columns, own):
     """Every number of every member, before any statistics."""
     pytest.importorskip("numba")
     state, seen = np.random.RandomState(5), []
@@ -80,14 +88,13 @@ def test_members_are_the_single_runs_bit_for_bit(monkeypatch, model):
         name: np.array(model.table[name].values) + state.standard_normal((MANY, model.rows)) / 9
         for name in (["i"] if model is football else ["n_theta", "n_r"])
     }
-    own = {"r_i": np.linspace(1, 100, MANY)} if model is football else {}
-    every = [c.name for c in model.all_columns()]
-    evaluate(model, given, members=MANY, columns=every, compiled=True, **own)
+    names = [] if columns else [*model.derived_scalars, *model.summaries]
+    columns = columns or [c.name for c in model.all_columns()]
+    evaluate(model, given, members=MANY, columns=columns, scalars=names, compiled=True, **own)
     rows, results = np.concatenate(seen[::2]), np.concatenate(seen[1::2])
-    names = [*model.derived_scalars, *model.summaries]
     for k in range(MANY):
         data = {name: values[k] for name, values in given.items()}
-        out, scalars = single(model, every, names, data, **{n: v[k] for n, v in own.items()})
+        out, scalars = single(model, columns, names, data, **{n: v[k] for n, v in own.items()})
         assert np.array_equal(rows[k], out, equal_nan=True)
         assert np.array_equal(results[k], scalars, equal_nan=True)
 
