@@ -11,10 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from sympy import (
     Expr,
+    ImmutableMatrix,
     Matrix,
     Symbol,
     diag,
@@ -288,6 +290,12 @@ def discrete_noise(F: Matrix, Q: Matrix, dt: Expr) -> Matrix:
     _check_square("F", F)
     if Q.shape != F.shape or not Q.is_symmetric():
         raise ModelError(f"Q must be symmetric and {F.rows} x {F.rows}; it is {Q}")
+    return Matrix(_discrete_noise(ImmutableMatrix(F), ImmutableMatrix(Q), dt))
+
+
+@lru_cache(maxsize=32)
+def _discrete_noise(F: ImmutableMatrix, Q: ImmutableMatrix, dt: Expr) -> ImmutableMatrix:
+    """Found once for filters that share their motion."""
     tau = Symbol("tau", real=True)
     Phi = transition_matrix(F, tau)
     return (Phi * Q * Phi.T).applyfunc(lambda e: simplify(integrate(e, (tau, 0, dt))))

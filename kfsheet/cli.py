@@ -151,21 +151,27 @@ def _check_one(path: Path, arguments: argparse.Namespace) -> int:
     if asked:
         asked.ask()  # it works while SymPy is imported
     from kfsheet.excel.check import check
+    from kfsheet.excel.compose import Run
     from kfsheet.excel.reading import Opened
     from kfsheet.exercises import exercise_names, load_exercise
 
     book = Opened(path, arguments.engine, asked)
+    given = arguments.exercise
+    likely = given or book.exercise_hint
+    # Both take time, in which the engine works.
+    exercise = load_exercise(likely) if given or likely in exercise_names() else None
+    built = Run.of(exercise.model) if exercise else None
     name = book.exercise_name()
-    exercise = load_exercise(arguments.exercise) if arguments.exercise else None
-    if exercise is None and name not in exercise_names():
+    if not given and name not in exercise_names():
         raise ModelError(
             f"{path} was built from {name!r}, which is not one of ours; "
             f"name its file: kfsheet check {path} --exercise {name}.py"
         )
-    exercise = exercise or load_exercise(name)
+    if exercise is None or (exercise.name != name and not given):
+        exercise, built = load_exercise(name), None
     if exercise.name != name:
         raise ModelError(f"{path} was built from {name!r}, not from {exercise.name!r}")
-    report = check(book, exercise)
+    report = check(book, exercise, built)
     for change in report.changed:
         print(f"{path}: changed: {change}")
     lines = report.lines()

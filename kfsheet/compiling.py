@@ -29,6 +29,7 @@ from platformdirs import user_cache_dir
 
 from kfsheet.errors import EngineError, KfsheetError
 from kfsheet.files import write_file
+from kfsheet.processes import command
 
 HERE = Path(__file__).parent
 SEASON = 90 * 24 * 3600  # seconds that a kernel is kept without being used
@@ -230,11 +231,6 @@ class _Background:
     Not a thread: the compiler is mostly Python, and would take half of the interpreter's time.
     """
 
-    PROGRAM = (
-        "import sys; sys.path.insert(0, sys.argv[1]); "
-        "from kfsheet.compiling import compile_file; compile_file(sys.argv[2])"
-    )
-
     def __init__(self) -> None:
         self._lock = Lock()
         self._tried: set[str] = set()
@@ -262,9 +258,8 @@ class _Background:
         return False
 
     def _start(self, path: Path) -> None:
-        # -P: no module in the current folder shall pass for one of the library.
         self._process = subprocess.Popen(
-            [sys.executable, "-P", "-c", self.PROGRAM, str(HERE.parent), str(path)],
+            command("kfsheet.compiling", "compile_file", str(path)),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import openpyxl
@@ -51,6 +52,24 @@ def test_check_names_the_cell_and_leaves_with_1(run, football_file, tmp_path):
     assert status == 1
     assert "Reanalysis!G9: x_f, photo 5: the sheet has" in out
     assert "1 cell is wrong in IronCalc" in out
+
+
+@pytest.mark.parametrize("property_", ["cannonball", "no_exercise_of_ours", None])
+def test_the_cell_says_which_exercise_it_is_whatever_the_properties_say(
+    run, football_file, tmp_path, property_
+):
+    path, part = tmp_path / "other.xlsx", "docProps/custom.xml"
+    with zipfile.ZipFile(football_file) as old, zipfile.ZipFile(path, "w") as new:
+        assert b">football<" in old.read(part)
+        for item in old.infolist():
+            content = old.read(item)
+            if item.filename == part and property_:
+                content = content.replace(b">football<", f">{property_}<".encode())
+            if item.filename != part or property_:
+                new.writestr(item, content)
+    status, out, _ = run("check", path)
+    assert status == 0
+    assert "formulas agree with NumPy" in out
 
 
 def test_one_bad_file_does_not_keep_the_others_from_being_checked(run, football_file, tmp_path):

@@ -27,6 +27,22 @@ def test_an_engine_that_ends_is_an_error_in_one_line():
         apart.answer()
 
 
+def test_an_engine_that_takes_too_long_is_stopped(monkeypatch):
+    monkeypatch.setattr("kfsheet.excel.engine.TIMEOUT", 0.01)
+    apart = Apart(FOOTBALL)
+    apart.ask()
+    with pytest.raises(EngineError, match=r"ended while it calculated .*, after 0.01 s"):
+        apart.answer()
+
+
+def test_a_module_of_the_current_folder_does_not_pass_for_one_of_the_library(tmp_path, monkeypatch):
+    (tmp_path / "ironcalc.py").write_text("raise SystemExit('not this one')")
+    monkeypatch.chdir(tmp_path)
+    apart = Apart(FOOTBALL)
+    apart.ask()
+    assert apart.answer() == IronCalc(FOOTBALL).values()
+
+
 def test_what_cannot_be_read_is_said_by_the_process_too(tmp_path):
     path = tmp_path / "a.xlsx"
     path.write_bytes(b"no workbook")

@@ -1,6 +1,6 @@
 """A spreadsheet engine in a process of its own: a formula may take it for ever, or all memory.
 
-The process is this module, run with ``python -m``. It is sent what to calculate as a pickle, which
+The process calls :func:`main`. It is sent what to calculate as a pickle, which
 comes from us, and answers in JSON, since what it read comes from somebody else.
 """
 
@@ -18,6 +18,7 @@ from kfsheet.excel.engine import CellValue
 from kfsheet.excel.recalculate import open_in
 from kfsheet.excel.references import Address
 from kfsheet.excel.stripping import Changes
+from kfsheet.processes import command
 
 
 def calculated(
@@ -31,9 +32,9 @@ def calculated(
         If the engine fails or takes longer than ``seconds``.
     """
     asked = pickle.dumps((str(path), list(trials), list(cells)))
-    command = [sys.executable, "-m", "kfsheet.coursework.engine"]
+    program = command("kfsheet.coursework.engine", "main")
     try:
-        done = subprocess.run(command, input=asked, capture_output=True, timeout=seconds)
+        done = subprocess.run(program, input=asked, capture_output=True, timeout=seconds)
     except subprocess.TimeoutExpired:
         raise EngineError(f"calculating took longer than {seconds:.0f} s") from None
     if done.returncode:
@@ -51,7 +52,3 @@ def main() -> int:
         return 1
     json.dump([[v.get(c[0], {}).get(c[1:]) for c in cells] for v in found], sys.stdout)
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -13,20 +13,18 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from kfsheet.errors import DataError
 from kfsheet.excel.compare import Comparison
 from kfsheet.excel.compose import Run
-from kfsheet.excel.engine import Values
 from kfsheet.excel.reading import Inputs, Opened, layout_of, place
 from kfsheet.excel.references import Address
 from kfsheet.excel.stripping import Changes
 from kfsheet.exercise import Exercise
 
-TOLERANCES = {"ironcalc": 1e-12, "libreoffice": 1e-11}
 NUDGE = 0.01
 GOLDEN = (math.sqrt(5) - 1) / 2
 
@@ -109,25 +107,24 @@ def check_workbook(path: str | Path, exercise: Exercise, engine: str = "ironcalc
     return check(Opened(path, engine), exercise)
 
 
-def check(book: Opened, exercise: Exercise) -> Report:
-    """Compare a workbook that is open in an engine; see :func:`check_workbook`."""
-    built = Run.of(exercise.model)
+def check(book: Opened, exercise: Exercise, built: Run | None = None) -> Report:
+    """Compare a workbook that is open in an engine; see :func:`check_workbook`.
+
+    ``built`` is the run of the exercise as it is, if that is known.
+    """
+    built = built or Run.of(exercise.model)
     layout = layout_of(book, exercise)
     inputs = Inputs(book, layout)
     changed = list(_changed(inputs, built))
 
-    def compare(values: Values, now: Run) -> Comparison:
-        comparison = Comparison(book, layout, values, TOLERANCES[book.engine_name])
-        comparison.run(exercise, now, built)
-        return comparison
+    def expecting(run: Run) -> Comparison:
+        return Comparison(book, layout, exercise, run, built)
 
     now = Run.of(exercise.model, inputs.data, inputs.parameters) if changed else built
-    trials = _answered(book, inputs, now)
-    _, *as_it_stands = next(trials)
-    first = compare(*as_it_stands)
+    trials = _compared(book, inputs, now, expecting)
+    _, first = next(trials)
     found, differing = first.problems, set(first.differing)
-    for words, *other in trials:
-        trial = compare(*other)
+    for words, trial in trials:
         told = {address: f"{reason} ({words})" for address, reason in trial.problems.items()}
         found, differing = {**told, **found}, differing | set(trial.differing)
     return Report(
@@ -162,21 +159,28 @@ def _changed(inputs: Inputs, built: Run) -> Iterator[str]:
             yield f"{count} value{'s' * (count > 1)} of {name}"
 
 
-def _answered(book: Opened, inputs: Inputs, now: Run) -> Iterator[tuple[str, Values, Run]]:
-    """What the engine and NumPy find, as the file stands and then with other inputs.
+def _compared(
+    book: Opened, inputs: Inputs, now: Run, expecting: Callable[[Run], Comparison]
+) -> Iterator[tuple[str, Comparison]]:
+    """Engine and NumPy compared, as the file stands and then with other inputs.
 
-    While the caller compares, the engine works on the next ones.
+    While numbers are compared, and those prepared that are expected, the engine works.
     """
-    words, values = "", book.values
+    words, values, expected = "", book.values, None
     for change, (changes, data, parameters) in _trials(inputs):
         try:
             other = Run.of(inputs.layout.model, data, parameters)
         except DataError:
             continue  # the model has no value there; the other comparisons have to do
         book.engine.ask(changes)
-        yield words, values, now
-        words, values, now = change, book.engine.answer(), other
-    yield words, values, now
+        expected = expected or expecting(now)
+        expected.run(values)
+        yield words, expected
+        words, expected = change, expecting(other)
+        values = book.engine.answer()
+    expected = expected or expecting(now)
+    expected.run(values)
+    yield words, expected
 
 
 def _trials(inputs: Inputs) -> Iterator[tuple[str, tuple[Changes, Data, dict[str, float]]]]:

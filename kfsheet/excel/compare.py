@@ -41,19 +41,30 @@ from kfsheet.exercise import Exercise
 from kfsheet.expressions import lag, t
 from kfsheet.pythoncode import python_code
 
+TOLERANCES = {"ironcalc": 1e-12, "libreoffice": 1e-11}
+
 
 class Comparison:
-    """Expected pieces beside an engine's values, and who is to blame for a difference."""
+    """Expected pieces beside an engine's values, and who is to blame for a difference.
 
-    def __init__(self, book: Opened, layout: Layout, values: Values, tolerance: float) -> None:
-        self.book, self.layout, self.values, self.tolerance = book, layout, values, tolerance
+    ``now`` is the run that is expected, ``built`` the one that the workbook was built from.
+    """
+
+    def __init__(
+        self, book: Opened, layout: Layout, exercise: Exercise, now: Run, built: Run
+    ) -> None:
+        self.book, self.layout = book, layout
+        self.tolerance = TOLERANCES[book.engine_name]
+        self.pages = [*self._pages(exercise, now, built)]
+        self.values: Values = {}
         self.cells, self.largest = 0, 0.0
         self.differing: dict[Address, Piece] = {}
         self.problems: dict[Address, str] = {}
 
-    def run(self, exercise: Exercise, now: Run, built: Run) -> None:
+    def run(self, values: Values) -> None:
         """Compare every formula cell, then look for the culprits among those that differ."""
-        for page in self._pages(exercise, now, built):
+        self.values = values
+        for page in self.pages:
             for (row, column), piece in page.pieces.items():
                 self._compare((page.title, row, column), piece)
             for column, filled in page.columns.items():
@@ -88,7 +99,7 @@ class Comparison:
         if not filled.rules:
             return filled.kind != "index" or found == list(filled.values)
         hollow = {filled.first + n for n, rule in enumerate(filled.rules) if rule is None}
-        formulas = {row for row in self.book.formula_rows(sheet, at) if row in rows}
+        formulas = self.book.formulas_among(rows, sheet, at)
         if formulas != set(rows) - hollow or bool in set(map(type, found)):
             return False
         numbers = _numbers(found, filled.missing)

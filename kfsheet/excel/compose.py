@@ -15,7 +15,14 @@ from openpyxl.utils import get_column_letter
 
 from kfsheet.checks import columns_read
 from kfsheet.evaluation import run
-from kfsheet.excel.layout import FIRST_ROW, PARAMETER_ROW, Layout, chart_place, quote
+from kfsheet.excel.layout import (
+    EXERCISE_NAME,
+    FIRST_ROW,
+    PARAMETER_ROW,
+    Layout,
+    chart_place,
+    quote,
+)
 from kfsheet.excel.page import Filled, Page, Piece, stored
 from kfsheet.excel.styles import LEGEND, number_format
 from kfsheet.exercise import Exercise
@@ -233,7 +240,7 @@ def readme_page(exercise: Exercise, layout: Layout) -> Page:
     row = _block(page, row + 1, "Sheets", [(w, "index", s) for s, w in sheets.items()])
     facts = {"exercise": exercise.name, "source": exercise.source, "notebook": exercise.notebook}
     _block(page, row + 1, "About", [(w, "index", name) for name, w in facts.items() if w])
-    page.names["kfsheet_exercise"] = (row + 2, 2)
+    page.names[EXERCISE_NAME] = (row + 2, 2)
     return page
 
 

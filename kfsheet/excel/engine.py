@@ -1,7 +1,7 @@
 """IronCalc, the spreadsheet engine that comes with kfsheet; in this process or in one of its own.
 
-A process of its own works while this one does something else, and can be stopped. It is this
-module, run with ``python -m``; little is imported here, so that it starts at once.
+A process of its own works while this one does something else, and can be stopped. It calls
+:func:`main`; little is imported here, so that it starts at once.
 """
 
 from __future__ import annotations
@@ -12,14 +12,23 @@ import sys
 import tempfile
 import weakref
 from contextlib import suppress
-from itertools import starmap
+from itertools import groupby, starmap
+from operator import itemgetter
 from pathlib import Path
+from threading import Timer
 from typing import Any, BinaryIO
 
 from kfsheet.errors import EngineError, KfsheetError, WorkbookError
 from kfsheet.excel.stripping import Changes, strip_values
+from kfsheet.processes import command
+
+TIMEOUT = 300  # seconds
 
 CellValue = float | int | str | bool | None
+Place = tuple[int, int, int]
+"""Number of the sheet, counted from 0, row and column, counted from 1."""
+Cells = dict[str, list[tuple[int, int]]]
+"""Row and column, counted from 1, of the cells of each sheet."""
 Values = dict[str, dict[tuple[int, int], CellValue]]
 """Value by sheet and (row, column), counted from 1; errors are strings such as '#DIV/0!'."""
 
@@ -37,27 +46,35 @@ class IronCalc:
                 self._model = ironcalc.load_from_xlsx(str(copy), "en", "UTC")
             except Exception as error:  # its own kind and, from Rust, PanicException
                 raise EngineError(f"IronCalc cannot read the workbook: {error}") from None
-        self._sheets = [sheet["name"] for sheet in self._model.get_worksheets_properties()]
-        self._before: dict[tuple[int, int, int], CellValue] = {}
+        self._titles = [sheet["name"] for sheet in self._model.get_worksheets_properties()]
+        self._before: dict[Place, CellValue] = {}
+        self._places: list[Place] = []
+        self._sorted: list[Place] = []
+        self._cells: Cells = {}
 
     def values(self, changes: Changes | None = None) -> Values:
         """Values of all cells that are not empty, with numbers put in first."""
+        return _by_address(*self.calculated(changes))
+
+    def calculated(self, changes: Changes | None = None) -> tuple[Cells, list[CellValue]]:
+        """All cells, and the values of one after the other, with numbers put in first."""
         self._restore()
         for sheet, cells in (changes or {}).items():
-            number = self._sheets.index(sheet)
+            number = self._titles.index(sheet)
             for (row, column), value in cells.items():
                 self._put(number, row, column, value)
         try:
             self._model.evaluate()
         except Exception as error:
             raise EngineError(f"IronCalc cannot calculate the workbook: {error}") from None
-        found: list[dict[tuple[int, int], CellValue]] = [{} for _ in self._sheets]
-        cells = self._model.get_all_cells()
-        values = starmap(self._model.get_cell_value, cells)
-        for (sheet, row, column), value in zip(cells, values, strict=True):
-            if value is not None:
-                found[sheet][row, column] = value
-        return dict(zip(self._sheets, found, strict=True))
+        places = self._model.get_all_cells()
+        if places != self._places:
+            self._places = places
+            self._sorted = sorted(places, key=itemgetter(0))
+            self._cells = {title: [] for title in self._titles}
+            for sheet, those in groupby(self._sorted, itemgetter(0)):
+                self._cells[self._titles[sheet]] = [place[1:] for place in those]
+        return self._cells, list(starmap(self._model.get_cell_value, self._sorted))
 
     def _put(self, sheet: int, row: int, column: int, value: float | None) -> None:
         place = sheet, row, column
@@ -65,7 +82,7 @@ class IronCalc:
         self._before[place] = formula or self._model.get_cell_value(*place)
         self._write(place, value)
 
-    def _write(self, place: tuple[int, int, int], content: CellValue) -> None:
+    def _write(self, place: Place, content: CellValue) -> None:
         if content is None:
             self._model.clear_cell_contents(*place)
         elif isinstance(content, bool):
@@ -84,6 +101,16 @@ class IronCalc:
         self._before.clear()
 
 
+def _by_address(cells: Cells, values: list[CellValue]) -> Values:
+    """Values that are not empty, sheet by sheet."""
+    found, start = {}, 0
+    for title, places in cells.items():
+        those = zip(places, values[start : start + len(places)], strict=True)
+        found[title] = {place: value for place, value in those if value is not None}
+        start += len(places)
+    return found
+
+
 class Apart:
     """IronCalc in a process of its own: it is asked first, and answers when it is done.
 
@@ -92,14 +119,14 @@ class Apart:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        command = [sys.executable, "-m", "kfsheet.excel.engine", str(path)]
         self._process = subprocess.Popen(
-            command,
+            command("kfsheet.excel.engine", "main", str(path)),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
         )
         weakref.finalize(self, _end, self._process)
+        self._cells: Cells = {}
 
     def ask(self, changes: Changes | None = None) -> None:
         """Calculate, with numbers put in first."""
@@ -112,13 +139,20 @@ class Apart:
 
     def answer(self) -> Values:
         """Values of all cells that are not empty."""
+        limit = Timer(TIMEOUT, self._process.kill)
+        limit.start()
         try:
-            kind, found = _received(self._process.stdout)
+            kind, *found = _received(self._process.stdout)
         except EOFError:
-            raise EngineError(f"IronCalc ended while it calculated {self.path}") from None
+            late = f", after {TIMEOUT} s" if limit.finished.is_set() else ""
+            raise EngineError(f"IronCalc ended while it calculated {self.path}{late}") from None
+        finally:
+            limit.cancel()
         if kind != "values":
-            raise {"WorkbookError": WorkbookError}.get(kind, EngineError)(found)
-        return found
+            raise {"WorkbookError": WorkbookError}.get(kind, EngineError)(*found)
+        cells, values = found
+        self._cells = cells or self._cells
+        return _by_address(self._cells, values)
 
 
 def _send(pipe: BinaryIO, value: object) -> None:
@@ -142,6 +176,7 @@ def _end(process: subprocess.Popen) -> None:
 def main(path: str) -> None:
     """Answer what standard input asks, until it ends."""
     engine: IronCalc | None = None
+    told: Cells = {}
     while True:
         try:
             changes = _received(sys.stdin.buffer)
@@ -149,11 +184,10 @@ def main(path: str) -> None:
             return
         try:
             engine = engine or IronCalc(Path(path))
-            answer = ("values", engine.values(changes))
+            cells, values = engine.calculated(changes)
+            # The same cells each time, unless one was emptied: they are sent once.
+            answer = "values", None if cells is told else cells, values
+            told = cells
         except KfsheetError as error:
-            answer = (type(error).__name__, str(error))
+            answer = type(error).__name__, str(error)
         _send(sys.stdout.buffer, answer)
-
-
-if __name__ == "__main__":
-    main(sys.argv[1])

@@ -19,6 +19,9 @@ from kfsheet.excel.references import Address
 from kfsheet.expressions import Last, lag, t
 from kfsheet.recurrence import Recurrence
 
+EXERCISE_NAME, EXERCISE_PROPERTY = "kfsheet_exercise", "kfsheet exercise"
+"""The cell and the property of the file that hold the name of the exercise."""
+
 SYMBOL_ROW, UNIT_ROW, WORDS_ROW, FIRST_ROW = 1, 2, 3, 4
 PARAMETER_ROW = 5
 

@@ -21,7 +21,7 @@ FORMULA_CELL = re.compile(rb'<(?:\w+:)?c\b[^>]*?\br="([A-Z]+)([1-9][0-9]*)"[^>]*
 
 
 class Package:
-    """Worksheets by title, defined names, and which cells hold formulas.
+    """Worksheets by title, defined names, properties, and which cells hold formulas.
 
     Raises
     ------
@@ -34,6 +34,7 @@ class Package:
         with refusing(path), zipfile.ZipFile(path) as archive:
             book = ElementTree.fromstring(archive.read("xl/workbook.xml"))
             self._sheets = {t: archive.read(part) for t, part in worksheet_parts(archive).items()}
+            self.properties = _properties(archive)
         self._names = {
             name.get("name", ""): name.text or "" for name in book.iter(f"{{{MAIN}}}definedName")
         }
@@ -61,3 +62,11 @@ class Package:
             return (places[0][0], *coordinate_to_tuple(places[0][1].replace("$", "")))
         except ValueError:
             return None
+
+
+def _properties(archive: zipfile.ZipFile) -> dict[str, str]:
+    """The file's own properties, which programs keep and nobody sees, by name."""
+    if "docProps/custom.xml" not in archive.namelist():
+        return {}
+    root = ElementTree.fromstring(archive.read("docProps/custom.xml"))
+    return {item.get("name", ""): "".join(item.itertext()) for item in root}

@@ -11,14 +11,19 @@ from openpyxl.utils import get_column_letter
 
 from kfsheet.errors import DataError, WorkbookError
 from kfsheet.excel.engine import CellValue, Values
-from kfsheet.excel.layout import FIRST_ROW, SYMBOL_ROW, Layout, quote
+from kfsheet.excel.layout import (
+    EXERCISE_NAME,
+    EXERCISE_PROPERTY,
+    FIRST_ROW,
+    SYMBOL_ROW,
+    Layout,
+    quote,
+)
 from kfsheet.excel.package import Package
 from kfsheet.excel.recalculate import Asked, ask_about, open_workbook
 from kfsheet.excel.references import Address
 from kfsheet.exercise import Exercise
 from kfsheet.recurrence import Recurrence
-
-EXERCISE_NAME = "kfsheet_exercise"
 
 
 class Opened:
@@ -31,6 +36,7 @@ class Opened:
         self.path, self.engine_name = Path(path), engine
         self.engine = asked or ask_about(path, engine)
         self.package = Package(path)
+        self._among: dict[tuple[range, str, int], set[int]] = {}
         self._formulas = {title: self.package.formulas(title) for title in self.package.titles}
 
     @cached_property
@@ -47,6 +53,13 @@ class Opened:
         """Rows of a column that hold formulas."""
         return self._formulas.get(sheet, {}).get(column, set())
 
+    def formulas_among(self, rows: range, sheet: str, column: int) -> set[int]:
+        """Those of some rows of a column that hold formulas."""
+        key = rows, sheet, column
+        if key not in self._among:
+            self._among[key] = {row for row in self.formula_rows(sheet, column) if row in rows}
+        return self._among[key]
+
     def is_formula(self, address: Address) -> bool:
         """Whether a cell holds a formula."""
         sheet, row, column = address
@@ -60,6 +73,11 @@ class Opened:
     @cached_property
     def _texts(self) -> Workbook:
         return open_workbook(self.path)
+
+    @property
+    def exercise_hint(self) -> str:
+        """Name of the exercise as the file's properties have it, before the engine has answered."""
+        return self.package.properties.get(EXERCISE_PROPERTY, "")
 
     def exercise_name(self) -> str:
         """Name of the exercise that the workbook was built from.

@@ -20,10 +20,9 @@ import openpyxl
 from openpyxl.utils.exceptions import InvalidFileException
 
 from kfsheet.errors import EngineError, WorkbookError
-from kfsheet.excel.engine import Apart, IronCalc, Values
+from kfsheet.excel.engine import TIMEOUT, Apart, IronCalc, Values
 from kfsheet.excel.stripping import Changes, strip_values
 
-TIMEOUT = 300  # seconds, for LibreOffice
 # Where installers put it on macOS and Windows without a word to PATH.
 LIBREOFFICE_HOMES = (
     "/Applications/LibreOffice.app/Contents/MacOS/soffice",

@@ -21,6 +21,7 @@ PREFIX = re.compile(rb"<(\w+:)?worksheet\b")
 STORED = tuple(end + rb"\s*<%(p)bv\b[^>]*>[^<]*</%(p)bv>" for end in (b"</%(p)bf>", b"/>"))
 EMPTIED = (b"</%(p)bf><%(p)bv></%(p)bv>", b"/><%(p)bv></%(p)bv>")
 TYPED = re.compile(rb'\st="[A-Za-z]+"(?=[^<>]*>\s*<(?:\w+:)?f\b)')
+KINDS = [b't="%s"' % kind for kind in (b"str", b"n", b"b", b"e", b"s", b"d")]
 CELL = re.compile(rb"<((?:\w+:)?c)((?:\s[^>]*)?)(?:/>|(?<!/)>.*?</\1>)", re.DOTALL)
 TYPE = re.compile(rb'\s+t="[^"]*"')
 ADDRESS = re.compile(rb'\sr="([A-Z]+\d+)"')
@@ -58,9 +59,11 @@ def _stripped(xml: bytes) -> bytes:
     found = PREFIX.search(xml)
     prefix = {b"p": (found and found[1]) or b""}
     # An empty value, not none at all: IronCalc reports a formula that lacks the element.
-    for stored, emptied in zip(STORED, EMPTIED, strict=True):
-        xml = re.sub(stored % prefix, emptied % prefix, xml)
-    xml = TYPED.sub(b"", xml)
+    for stored, emptied, needed in zip(STORED, EMPTIED, (b"", b"shared"), strict=True):
+        if needed in xml:
+            xml = re.sub(stored % prefix, emptied % prefix, xml)
+    if any(kind in xml for kind in KINDS):
+        xml = TYPED.sub(b"", xml)
     return EMPTY.sub(rb"\1\2", xml) if b't="n"' in xml else xml
 
 

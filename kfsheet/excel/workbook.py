@@ -28,7 +28,7 @@ from kfsheet.excel.compose import (
 )
 from kfsheet.excel.drawing import draw
 from kfsheet.excel.finish import finish, untouched
-from kfsheet.excel.layout import FIRST_ROW, Layout
+from kfsheet.excel.layout import EXERCISE_PROPERTY, FIRST_ROW, Layout
 from kfsheet.excel.page import Page
 from kfsheet.excel.styles import Styles
 from kfsheet.exercise import Exercise
@@ -228,5 +228,5 @@ def _grey_rows(book: Workbook, layout: Layout, name: str) -> None:
 
 def _describe(book: Workbook, exercise: Exercise) -> None:
     book.properties.creator, book.properties.title = "kfsheet", exercise.title
-    book.custom_doc_props.append(StringProperty(name="kfsheet exercise", value=exercise.name))
+    book.custom_doc_props.append(StringProperty(name=EXERCISE_PROPERTY, value=exercise.name))
     book.active = 0
