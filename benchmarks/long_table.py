@@ -4,6 +4,7 @@ import sys
 import time
 
 import numpy as np
+from measuring import peak
 from sympy import Matrix, Symbol
 
 import kfsheet as kf
@@ -27,16 +28,6 @@ def walk(rows: int) -> kf.Exercise:
     observation = kf.Observation("x", seen[kf.t], x, r, "m")
     kf.add_filter(m, kf.StateSpace(state, [x + v * dt, v], Q, [observation]), section="Filter")
     return kf.Exercise(model=m, about=("A long table.",), source="benchmarks")
-
-
-def peak() -> float:
-    """Megabytes; 0 where the system does not tell."""
-    if sys.platform == "win32":
-        return 0.0
-    import resource
-
-    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return most / (2**20 if sys.platform == "darwin" else 2**10)
 
 
 if __name__ == "__main__":

@@ -1,10 +1,12 @@
 """Times, as medians, and the lines of the table."""
 
 import os
+import re
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
@@ -41,20 +43,25 @@ def seconds(work: Callable[[], object], repeats: int = 5, calls: int = 1) -> flo
     return in_turn(work, repeats=repeats, calls=[calls])[0]
 
 
-PEAK = """
-import pathlib, re, resource, sys
-status = pathlib.Path("/proc/self/status")
-if status.exists():  # unlike getrusage, it knows nothing of the parent
-    print(int(re.search(r"VmHWM:\\s+(\\d+)", status.read_text())[1]) / 2**10)
-else:
-    unit = 2**20 if sys.platform == "darwin" else 2**10
-    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit)
-"""
+def peak() -> float:
+    """Megabytes that this process has taken at most; 0 where the system does not tell."""
+    status = Path("/proc/self/status")
+    if status.exists():  # unlike getrusage, it knows nothing of the parent
+        return int(re.search(r"VmHWM:\s+(\d+)", status.read_text())[1]) / 2**10
+    if sys.platform == "win32":
+        return 0.0
+    import resource
+
+    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return most / (2**20 if sys.platform == "darwin" else 2**10)
 
 
 def peak_memory(program: str, **environment: str) -> float:
     """Megabytes that a program takes at most, in a process of its own."""
-    command = [sys.executable, "-c", program + PEAK]
+    here = str(Path(__file__).parent)
+    print_peak = "\nimport sys; sys.path.insert(0, sys.argv[1]); import measuring"
+    print_peak += "; print(measuring.peak())"
+    command = [sys.executable, "-c", program + print_peak, here]
     around = {**os.environ, **environment}
     done = subprocess.run(command, env=around, capture_output=True, text=True, check=True)
     return float(done.stdout.split()[-1])
