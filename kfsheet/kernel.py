@@ -7,24 +7,20 @@ keeps in registers. :mod:`kfsheet.compiling` makes machine code of it.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from sympy import Add, Expr, Indexed, Mul, Piecewise, Pow, S
+from sympy import Expr
 
 from kfsheet.checks import columns_read
 from kfsheet.expressions import Missing, column_references, lag
-from kfsheet.pythoncode import PythonPrinter
+from kfsheet.kernelcode import CHEAP, PRELUDE, KernelPrinter, balanced, carried, unless_missing
 from kfsheet.schedule import Pass, needed
 
 if TYPE_CHECKING:
     from kfsheet.parts import Column
     from kfsheet.recurrence import Recurrence
-
-CHEAP = ("**", "abs", "observed", "sign")
-"""Calls, and the power of a whole number, that are plain arithmetic to a processor."""
 
 
 @dataclass(frozen=True)
@@ -56,62 +52,6 @@ def kernel_of(
     return KernelSource(model, columns, scalars).kernel()
 
 
-class _Printer(PythonPrinter):
-    """A cell of this row is a local variable, one of a row before is another."""
-
-    def __init__(self, source: KernelSource) -> None:
-        super().__init__()
-        self._source = source
-        self._branches = 0
-        self._hiding = 0  # depth inside what may turn an infinite value into a finite one
-
-    @contextmanager
-    def _inside(self) -> Iterator[None]:
-        """Prints what may turn an infinite value into a finite one."""
-        self._hiding += 1
-        try:
-            yield
-        finally:
-            self._hiding -= 1
-
-    def _print_Indexed(self, expr: Indexed) -> str:
-        return self._source.cell(str(expr.base.label), int(lag(expr)))
-
-    def _print_IndexedBase(self, expr: Expr) -> str:
-        return self._source.whole(str(expr.label))
-
-    def _print_Piecewise(self, expr: Expr) -> str:
-        self._branches += 1
-        try:
-            with self._inside():
-                return super()._print_Piecewise(expr)
-        finally:
-            self._branches -= 1
-
-    def _denominator(self, factors: list[Expr]) -> str:
-        with self._inside():
-            text = super()._denominator(factors)
-        self._source.divide(factors, text, bool(self._branches))
-        return text
-
-    def _call(self, name: str, *arguments: Expr) -> str:
-        with self._inside():
-            text = super()._call(name, *arguments)
-        return self._source.call(name, arguments, text, bool(self._branches))
-
-    def _print_Pow(self, expr: Expr) -> str:
-        exponent = expr.exp
-        if exponent.is_Number and exponent < 0:
-            return super()._print_Pow(expr)  # a division
-        if not exponent.is_Integer and exponent != S.Half:
-            return self._call("power", expr.base, exponent)
-        name, text = "sqrt" if exponent == S.Half else "**", super()._print_Pow(expr)
-        if self._hiding:
-            # Python refuses a power that overflows; in a sum it is seen at the end of the row.
-            name, text = "bounded", f"bounded({text})"
-        return self._source.call(name, (expr,), text, bool(self._branches))
-
-
 class KernelSource:
     """Writes the kernel of a model, leaving out what nothing wanted needs."""
 
@@ -126,7 +66,7 @@ class KernelSource:
         self.now = 0
         self._once: dict[str, str] = {}
         self._in_rows = False
-        self._code = _Printer(self).doprint
+        self._code = KernelPrinter(self).doprint
 
     def kernel(self) -> Kernel:
         """The kernel, and what it takes and stores."""
@@ -236,7 +176,7 @@ class KernelSource:
         lines = []
         for s in scalars:
             lines.append(f"        {s.name} = float({self._code(s.expression)})")
-            lines.append(f"        kfsheet_bad += {_unless_missing(s.name)}")
+            lines.append(f"        kfsheet_bad += {unless_missing(s.name)}")
         return lines
 
     def _body(self) -> Iterator[str]:
@@ -263,21 +203,22 @@ class KernelSource:
             yield from self._one_row(columns, row, depth, " " * 8)
             yield from self._test(columns, row, " " * 8)
         loop = len(starts)
+        if loop == self.model.rows:
+            return
         yield f"        for t in range({loop}, rows):"
         yield from self._one_row(general, loop, depth, " " * 12)
         # What is infinite makes those infinite that carry it, up to the end of the table.
-        carried = {name for c in general for name in _carried(c.expression)}
-        yield from self._test([c for c in general if c.name not in carried], loop, " " * 12)
-        yield f"        if rows > {loop}:"
-        yield from self._test(general, loop, " " * 12)
+        seen_later = {name for c in general for name in carried(c.expression)}
+        yield from self._test([c for c in general if c.name not in seen_later], loop, " " * 12)
+        yield from self._test(general, loop, " " * 8)
 
     def _test(self, columns: Sequence[Column], row: int, indent: str) -> Iterator[str]:
         """Note what is not finite in a row; NaN is fine where the rule may give no value."""
         tests = [
-            _unless_missing(c.name) if c.definition(row).has(Missing) else f"({c.name} - {c.name})"
+            unless_missing(c.name) if c.definition(row).has(Missing) else f"({c.name} - {c.name})"
             for c in columns
         ]
-        yield f"{indent}kfsheet_bad += {_balanced(tests) if tests else 0.0}"
+        yield f"{indent}kfsheet_bad += {balanced(tests) if tests else 0.0}"
 
     def _one_row(
         self, columns: Sequence[Column], row: int, depth: dict[str, int], indent: str
@@ -315,45 +256,3 @@ class KernelSource:
             f"        kfsheet_rs[kfsheet_k - kfsheet_first, {n}] = {name}"
             for n, name in enumerate(self.scalars)
         ]
-
-
-def _unless_missing(name: str) -> str:
-    """0, or NaN for what is infinite; missing values are fine."""
-    return f"(0.0 if isnan({name}) else {name} - {name})"
-
-
-@lru_cache(maxsize=4096)
-def _carried(rule: Expr) -> frozenset[str]:
-    """Columns whose infinite or undefined value makes that of ``rule`` so too, in any case.
-
-    Those of this row or of the one before: so what is carried on is seen in the last row.
-    """
-    if isinstance(rule, Indexed):
-        return frozenset({str(rule.base.label)} if lag(rule) <= 1 else ())
-    if isinstance(rule, Piecewise):
-        return frozenset.intersection(*(_carried(value) for value, _ in rule.args))
-    if isinstance(rule, Add | Mul) or (isinstance(rule, Pow) and rule.exp.is_positive):
-        terms = rule.args[:1] if isinstance(rule, Pow) else rule.args
-        return frozenset().union(*map(_carried, terms))
-    return frozenset()
-
-
-def _balanced(terms: list[str]) -> str:
-    """A sum in pairs, so that no addition waits for all of those before."""
-    while len(terms) > 1:
-        terms = [f"({' + '.join(terms[n : n + 2])})" for n in range(0, len(terms), 2)]
-    return terms[0]
-
-
-PRELUDE = '''"""Generated by kfsheet; this file may be deleted at any time."""
-
-from math import asinh, atan, atan2, ceil, cos, floor, isnan, nan, pi, sin, tan, tanh
-
-from numpy import empty
-
-from kfsheet.fastmath import (
-    acos, acosh, asin, atanh, bounded, cosh, count, exp, largest, last, log, mean, observed,
-    power, rms, sign, sinh, smallest, sqrt, std, sumproduct, total
-)
-
-'''

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 
 from sympy import Expr
 
-from kfsheet.kernel import CHEAP, Kernel, KernelSource, kernel_of
+from kfsheet.kernel import Kernel, KernelSource, kernel_of
+from kfsheet.kernelcode import CHEAP
 
 if TYPE_CHECKING:
     from kfsheet.parts import Column
@@ -123,8 +124,9 @@ class _Lanes(KernelSource):
         for row, columns in enumerate(starts):
             yield f"        t = {row}"
             yield from self._block(columns, row, depth, " " * 8)
-        yield f"        for t in range({len(starts)}, rows):"
-        yield from self._block(general, len(starts), depth, " " * 12)
+        if len(starts) < self.model.rows:
+            yield f"        for t in range({len(starts)}, rows):"
+            yield from self._block(general, len(starts), depth, " " * 12)
 
     def _block(
         self, columns: Sequence[Column], row: int, depth: dict[str, int], indent: str

@@ -196,7 +196,8 @@ def test_python_goes_on_until_the_other_process_is_done(monkeypatch):
 def test_a_compiler_that_fails_is_told_of_once_and_python_goes_on(monkeypatch):
     model = unlike(5)
     background = compiling._Background()
-    monkeypatch.setattr(background, "PROGRAM", "raise SystemExit(3)")
+    failing = [sys.executable, "-c", "raise SystemExit(3)"]
+    monkeypatch.setattr(compiling, "command", lambda *_: failing)
     monkeypatch.setattr(compiling, "_BACKGROUND", background)
     for name in ("LOADING", "COMPILING"):
         monkeypatch.setattr(compiling, name, 1)

@@ -138,6 +138,17 @@ def test_a_table_of_start_rows_alone_may_lack_values(compiled):
     ]
 
 
+def test_what_no_row_asks_for_is_not_refused(compiled):
+    """The root has no value; but it is for rows that this table does not have."""
+    m = Recurrence("short", title="Short", rows=2)
+    a = m.parameter("a", -1, "", "a")
+    (v,) = m.columns("v", section="S")
+    m.define(v[t], v[t - 1] + sqrt(a), "", "v", start=[1, 2])
+    study = evaluate(m, members=2, columns=["v"], compiled=compiled)
+    assert study.rows["v"]["mean"].tolist() == [1, 2]
+    assert evaluate(m, compiled=compiled)["v"].tolist() == [1, 2]
+
+
 def test_what_was_not_observed_is_no_failure(compiled):
     m = Recurrence("gaps", title="Gaps", rows=4)
     y = m.data("y", [1, None, 3, 4], "", "seen", section="S", may_be_missing=True)
