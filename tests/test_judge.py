@@ -11,6 +11,7 @@ from students import ADA, SECRET, Paper
 import kfsheet.exercises
 from kfsheet import load_exercise
 from kfsheet.coursework.assessing import assess
+from kfsheet.coursework.grading import _judged
 from kfsheet.coursework.handout import handout_bytes
 from kfsheet.coursework.roster import Student
 from kfsheet.excel.recalculate import convert, libreoffice
@@ -477,3 +478,26 @@ def test_a_formula_that_takes_for_ever_costs_its_own_answer_only(football, monke
         cell.value = f"=SUMPRODUCT((A:A=A{cell.row}-1)*(K:K))+IFERROR(0,1)"
     mark = one(football, "u")
     assert mark.score == 0
+
+
+def test_an_answer_for_which_there_was_no_time_is_not_kept(football, monkeypatch, tmp_path):
+    """A machine was busy: grading again judges what it could not."""
+    football.answer_all()
+    football.answer("u", lambda text, _: f"=IFERROR({text[1:]},0)")
+    path = football.save()
+
+    def graded(seconds):
+        monkeypatch.setattr("kfsheet.coursework.recalculating.SECONDS", seconds)
+        judging = (((None, None, path, None), assess("football", SECRET, path)) for _ in (1,))
+        keys = {path: "key"}
+        run = (keys, "football", SECRET, tmp_path, lambda tasks: judging if tasks else ())
+        return _judged(*run, lambda found, _: found)["key"]
+
+    late = graded(0.01)
+    assert {mark.status for mark in late.marks} == {"right", "unreadable"}
+    assert "grade again" in late.remark
+    for _ in range(2):  # judged, then kept
+        done = graded(60)
+        assert {mark.status for mark in done.marks} == {"right"}
+        assert done.remark == ""
+    assert graded(0.01) == done

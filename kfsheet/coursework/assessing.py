@@ -38,6 +38,9 @@ class Assessment:
     feedback: bool = False
     """Whether a marked copy of the workbook could be made."""
 
+    final: bool = True
+    """Whether it would be the same on a machine that has more time."""
+
     def as_dict(self) -> dict[str, Any]:
         """For a file of results."""
         return asdict(self)
@@ -108,7 +111,6 @@ def _assessed(
     copy: Path | None,
 ) -> Assessment:
     own = own_numbers(exercise, secret, student)
-
     recalculation = Recalculation(path, scene)
 
     def asked(name: str) -> dict[int, bool]:
@@ -121,7 +123,10 @@ def _assessed(
     remarks = list(book.remarks)
     if changed := edits(exercise, book, judge.places, own):
         remarks.append(f"locked cells were changed ({', '.join(changed[:6])}); marks ignore that")
-    result = Assessment(GRADED, "; ".join(remarks), student, marks)
+    if recalculation.late:
+        remarks.append("there was no time to calculate all answers; grade again to try once more")
+    final = not recalculation.late
+    result = Assessment(GRADED, "; ".join(remarks), student, marks, final=final)
     if copy:
         result.feedback = _write_copy(path, copy, judge, result)
     return result

@@ -21,7 +21,7 @@ from kfsheet.exercise import Exercise
 from kfsheet.files import write_file
 
 MISSING, FOREIGN = "no submission", "somebody else's file"
-TIMED_OUT, CRASHED = NOT_FINAL = "timed out", "crashed"
+TIMED_OUT, CRASHED = "timed out", "crashed"
 STATUSES = {
     GRADED: "the answers were judged; see the marks",
     "untouched": "the workbook came back with no answer filled in",
@@ -175,7 +175,7 @@ def _judged(
     judged = ((path, _assessment(found)) for (_, _, path, _), found in run(tasks))
     for path, found in progress(judged, len(tasks)):
         known[names[path]] = found
-        if found.status not in NOT_FINAL:  # a busy machine; the next run tries again
+        if found.final:  # else the machine was busy, and the next run tries again
             content = json.dumps(found.as_dict()).encode()
             write_file(work / f"{names[path]}.json", content)
     return known
@@ -193,7 +193,7 @@ def _assessment(found: Assessment | Failed) -> Assessment:
     if isinstance(found, Assessment):
         return found
     status = TIMED_OUT if found.reason == "timed out" else CRASHED
-    return Assessment(status, f"{STATUSES[status]} ({found.reason})")
+    return Assessment(status, f"{STATUSES[status]} ({found.reason})", final=False)
 
 
 def _result(student: Student, handed: list[Handed], maximum: int) -> Result:

@@ -35,6 +35,8 @@ class Recalculation:
 
     def __init__(self, path: Path, scene: Scene) -> None:
         self._path, self._scene, self._left = path, scene, SECONDS
+        self.late = False
+        """Whether an answer was not judged because there was no time."""
 
     def __call__(self, places: Places, name: str) -> dict[int, bool]:
         """Whether each step of an answer has the key's value in every run; {} if none can tell."""
@@ -46,6 +48,7 @@ class Recalculation:
         try:
             found = calculated(self._path, trials, list(cells.values()), self._left)
         except KfsheetError:
+            self.late |= time.monotonic() - began >= self._left
             return {}
         finally:
             self._left = max(1.0, self._left - (time.monotonic() - began))
