@@ -14,7 +14,7 @@ import linecache
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache
-from math import isfinite, isinf
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -213,17 +213,24 @@ def without_value(
 ) -> str:
     """What is infinite, complex, or NaN though nothing was missing; '' if nothing is."""
     for name, column in _suspicious(columns):
-        array = np.array(column)
-        bad = np.iscomplex(array) | ~np.isfinite(array)
-        if bad.any() and name in gaps:
-            bad &= ~(gaps[name] & np.isnan(array))
-        if bad.any():
-            row = int(np.argmax(bad))
-            return f"{name} in row {row} is {column[row]}, no finite number"
+        for row, value in enumerate(column):
+            missing = value != value and name in gaps and gaps[name][row]
+            if not missing and (reason := _no_number(value)):
+                return f"{name} in row {row} {reason}"
     for name, value in scalars.items():
-        if isinf(value):
-            return f"{name} is {value}, no finite number"
+        if value == value and (reason := _no_number(value)):
+            return f"{name} {reason}"
     return ""
+
+
+def _no_number(value: complex) -> str:
+    """Why a value is no finite number; '' if it is."""
+    try:
+        return "" if isfinite(value) else f"is {value}, no finite number"
+    except TypeError:
+        return f"is {value}, no finite number: it holds a root or power of a negative number"
+    except OverflowError:  # of an endless integer
+        return "grows beyond 1e308"
 
 
 @lru_cache(maxsize=32)

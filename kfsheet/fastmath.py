@@ -1,14 +1,16 @@
 """What compiled kernels need: math that refuses what Python's refuses, and aggregates.
 
 Numba's own sqrt(-1) is NaN, which would pass for a missing value, and its exp(1000) is infinite;
-Python raises an error. So do these. Aggregates add with Neumaier's compensation, which agrees with
-math.fsum to about one unit in the last place; as everywhere, missing values (NaN) are left out.
+Python raises an error. So do these. Its floor(1e300) is an integer of 64 bits; these are floats.
+Aggregates add with Neumaier's compensation, which agrees with math.fsum to about one unit in the
+last place; as everywhere, missing values (NaN) are left out.
 """
 
 import math
 from math import isnan, nan
 
 import numba
+import numpy as np
 
 OPTIONS = {"nogil": True, "error_model": "python"}
 """How everything is compiled: without the interpreter's lock, and dividing as Python does."""
@@ -24,6 +26,13 @@ RANGE = "it grows beyond 1e308"
 def bounded(x):
     if math.isinf(x):
         raise OverflowError(RANGE)
+    return x
+
+
+@compiled
+def finite(x):
+    if math.isinf(x) or isnan(x):
+        raise ValueError(DOMAIN)
     return x
 
 
@@ -92,6 +101,16 @@ def power(x, y):
 
 
 @compiled
+def floor(x):
+    return np.floor(finite(x))
+
+
+@compiled
+def ceil(x):
+    return np.ceil(finite(x))
+
+
+@compiled
 def observed(x):
     return not isnan(x)
 
@@ -103,7 +122,7 @@ def sign(x):
 
 @compiled
 def count(column):
-    number = 0
+    number = 0.0
     for x in column:
         number += not isnan(x)
     return number
@@ -166,8 +185,3 @@ def last(column):
 @compiled
 def sumproduct(first, second):
     return total(first * second)
-
-
-CHECKED = "bounded exp cosh sinh sqrt log asin acos acosh atanh power".split()
-AGGREGATES = "count total mean rms std largest smallest last sumproduct".split()
-NAMES = [*CHECKED, "observed", "sign", *AGGREGATES]

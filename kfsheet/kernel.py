@@ -66,7 +66,7 @@ class KernelSource:
         self.now = 0
         self._once: dict[str, str] = {}
         self._in_rows = False
-        self._code = KernelPrinter(self).doprint
+        self._code = KernelPrinter(self).rule
 
     def kernel(self) -> Kernel:
         """The kernel, and what it takes and stores."""
@@ -208,7 +208,9 @@ class KernelSource:
         yield f"        for t in range({loop}, rows):"
         yield from self._one_row(general, loop, depth, " " * 12)
         # What is infinite makes those infinite that carry it, up to the end of the table.
-        seen_later = {name for c in general for name in carried(c.expression)}
+        # But not into a column that may be empty, where NaN is not told from a gap.
+        whole = [c.expression for c in general if not c.expression.has(Missing)]
+        seen_later = {name for expression in whole for name in carried(expression)}
         yield from self._test([c for c in general if c.name not in seen_later], loop, " " * 12)
         yield from self._test(general, loop, " " * 8)
 

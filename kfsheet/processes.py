@@ -1,9 +1,14 @@
-"""Processes of our own: a function of kfsheet, run by another interpreter."""
+"""Processes: a function of kfsheet, run by another interpreter; programs that start others."""
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from typing import BinaryIO
 
 PROGRAM = (
     "import sys; from importlib import import_module; sys.path.insert(0, sys.argv[1]); "
@@ -18,3 +23,36 @@ def command(module: str, function: str, *arguments: str) -> list[str]:
     """
     home = str(Path(__file__).resolve().parents[1])
     return [sys.executable, "-P", "-c", PROGRAM, home, module, function, *arguments]
+
+
+def answers() -> BinaryIO:
+    """Standard output, for answers alone: what else is printed goes to standard error.
+
+    A library in another language prints past Python's own ``sys.stdout``.
+    """
+    found = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    return found
+
+
+def completed(arguments: Sequence[str], seconds: float) -> subprocess.CompletedProcess[str]:
+    """Run a program that starts others; none is left of them if it is late or interrupted.
+
+    Raises
+    ------
+    subprocess.TimeoutExpired
+        If it takes longer than ``seconds``.
+    """
+    pipe = subprocess.PIPE
+    process = subprocess.Popen(
+        arguments, stdout=pipe, stderr=pipe, text=True, start_new_session=True
+    )
+    try:
+        out, err = process.communicate(timeout=seconds)
+    except BaseException:
+        if hasattr(os, "killpg"):
+            os.killpg(process.pid, signal.SIGKILL)  # all of its session
+        process.kill()
+        process.communicate()
+        raise
+    return subprocess.CompletedProcess(arguments, process.returncode, out, err)

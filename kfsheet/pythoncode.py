@@ -21,7 +21,7 @@ class PythonPrinter(FormulaPrinter):
             "sqrt exp log sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh "
             "sign floor"
         ).split()
-    } | {"Abs": "abs", "Min": "min", "Max": "max", "ceiling": "ceil"}
+    } | {"Abs": "fabs", "Min": "min", "Max": "max", "ceiling": "ceil"}
 
     def _print_Symbol(self, expr: Symbol) -> str:
         return expr.name

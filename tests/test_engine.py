@@ -1,12 +1,19 @@
 """IronCalc in a process of its own answers like IronCalc in this one, and may fail."""
 
+import datetime
+import re
+import time
+import zipfile
 from pathlib import Path
 
 import numpy as np
+import openpyxl
 import pytest
 
 from kfsheet import EngineError, WorkbookError
+from kfsheet.coursework.engine import calculated
 from kfsheet.excel.engine import Apart, IronCalc
+from kfsheet.excel.recalculate import recalculate
 
 FOOTBALL = Path(__file__).parents[1] / "workbooks" / "football.xlsx"
 KICK = {"Parameters": {(5, 2): np.float64(25.0)}}
@@ -58,3 +65,46 @@ def test_an_engine_that_is_no_longer_wanted_is_stopped_at_work():
     process = apart._process
     del apart
     assert process.poll() not in (None, 0)  # 0: it was waited for until it was done
+
+
+def test_what_an_engine_prints_is_no_answer(tmp_path):
+    """IronCalc prints a line for a date as ISO 8601 writes it."""
+    book = openpyxl.load_workbook(FOOTBALL)
+    book.iso_dates = True
+    book["Parameters"]["B40"] = datetime.date(2026, 11, 22)
+    book.save(tmp_path / "a.xlsx")
+    assert b't="d"' in zipfile.ZipFile(tmp_path / "a.xlsx").read("xl/worksheets/sheet2.xml")
+    apart, kick = Apart(tmp_path / "a.xlsx"), ("Parameters", 5, 2)
+    apart.ask(KICK)
+    assert apart.answer()["Parameters"][5, 2] == 25
+    assert calculated(tmp_path / "a.xlsx", [KICK], [kick], 60) == [[25]]
+
+
+def test_an_engine_that_panics_is_an_error_that_names_the_file(tmp_path):
+    """A name of a sheet that the file does not have; Rust's panic is no Exception to Python."""
+    path = tmp_path / "a.xlsx"
+    with zipfile.ZipFile(FOOTBALL) as old, zipfile.ZipFile(path, "w") as new:
+        for item in old.infolist():
+            content = old.read(item)
+            if item.filename == "xl/workbook.xml":
+                odd = b'<definedName name="odd" localSheetId="99">Parameters!$B$5</definedName>'
+                content = content.replace(b"<definedNames>", b"<definedNames>" + odd)
+            new.writestr(item.filename, content)
+    apart = Apart(path)
+    apart.ask()
+    for compute in (lambda: recalculate(path), apart.answer):
+        with pytest.raises(EngineError, match=f"IronCalc cannot read {re.escape(str(path))}: .+"):
+            compute()
+
+
+def test_an_engine_leaves_no_copy_behind(tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    apart = Apart(FOOTBALL.with_name("cannonball.xlsx"))
+    apart.ask()
+    end = time.monotonic() + 60
+    while not list(tmp_path.rglob("*.xlsx")) and time.monotonic() < end:
+        time.sleep(0.001)
+    assert list(tmp_path.rglob("*.xlsx"))
+    del apart
+    assert not list(tmp_path.iterdir())

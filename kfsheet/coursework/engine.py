@@ -18,7 +18,7 @@ from kfsheet.excel.engine import CellValue
 from kfsheet.excel.recalculate import open_in
 from kfsheet.excel.references import Address
 from kfsheet.excel.stripping import Changes
-from kfsheet.processes import command
+from kfsheet.processes import answers, command
 
 
 def calculated(
@@ -45,10 +45,13 @@ def calculated(
 def main() -> int:
     """Calculate what standard input asks for."""
     path, trials, cells = pickle.loads(sys.stdin.buffer.read())  # from calculated() above
+    pipe = answers()
     try:
         engine = open_in(path)
         found = [engine.values(changes) for changes in trials]
     except KfsheetError:
         return 1
-    json.dump([[v.get(c[0], {}).get(c[1:]) for c in cells] for v in found], sys.stdout)
+    wanted = [[v.get(c[0], {}).get(c[1:]) for c in cells] for v in found]
+    with pipe:
+        pipe.write(json.dumps(wanted).encode())
     return 0

@@ -7,11 +7,13 @@ A process of its own works while this one does something else, and can be stoppe
 from __future__ import annotations
 
 import marshal
+import shutil
 import subprocess
 import sys
 import tempfile
 import weakref
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from itertools import groupby, starmap
 from operator import itemgetter
 from pathlib import Path
@@ -20,7 +22,7 @@ from typing import Any, BinaryIO
 
 from kfsheet.errors import EngineError, KfsheetError, WorkbookError
 from kfsheet.excel.stripping import Changes, strip_values
-from kfsheet.processes import command
+from kfsheet.processes import answers, command
 
 TIMEOUT = 300  # seconds
 
@@ -33,19 +35,31 @@ Values = dict[str, dict[tuple[int, int], CellValue]]
 """Value by sheet and (row, column), counted from 1; errors are strings such as '#DIV/0!'."""
 
 
+@contextmanager
+def _words(words: str) -> Iterator[None]:
+    """What IronCalc raises, in one line; a panic of Rust is no Exception to Python."""
+    try:
+        yield
+    except (KeyboardInterrupt, SystemExit):
+        raise
+    except BaseException as error:
+        first = (str(error).splitlines() or [type(error).__name__])[0]
+        raise EngineError(f"{words}: {first}") from None
+
+
 class IronCalc:
     """A workbook in IronCalc: loaded once, calculated as often as inputs change."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, folder: str | None = None) -> None:
+        """``folder`` is where a copy of the file may lie for a moment."""
         import ironcalc
 
-        with tempfile.TemporaryDirectory(prefix="kfsheet-") as folder:
-            copy = Path(folder) / "copy.xlsx"
+        self._path = path
+        with tempfile.TemporaryDirectory(prefix="kfsheet-", dir=folder) as own:
+            copy = Path(own) / "copy.xlsx"
             strip_values(path, copy)
-            try:
+            with _words(f"IronCalc cannot read {path}"):
                 self._model = ironcalc.load_from_xlsx(str(copy), "en", "UTC")
-            except Exception as error:  # its own kind and, from Rust, PanicException
-                raise EngineError(f"IronCalc cannot read the workbook: {error}") from None
         self._titles = [sheet["name"] for sheet in self._model.get_worksheets_properties()]
         self._before: dict[Place, CellValue] = {}
         self._places: list[Place] = []
@@ -63,10 +77,8 @@ class IronCalc:
             number = self._titles.index(sheet)
             for (row, column), value in cells.items():
                 self._put(number, row, column, value)
-        try:
+        with _words(f"IronCalc cannot calculate {self._path}"):
             self._model.evaluate()
-        except Exception as error:
-            raise EngineError(f"IronCalc cannot calculate the workbook: {error}") from None
         places = self._model.get_all_cells()
         if places != self._places:
             self._places = places
@@ -119,13 +131,14 @@ class Apart:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
+        self._folder = tempfile.mkdtemp(prefix="kfsheet-")  # ours, who live longer
         self._process = subprocess.Popen(
-            command("kfsheet.excel.engine", "main", str(path)),
+            command("kfsheet.excel.engine", "main", str(path), self._folder),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
         )
-        weakref.finalize(self, _end, self._process)
+        weakref.finalize(self, _end, self._process, self._folder)
         self._cells: Cells = {}
 
     def ask(self, changes: Changes | None = None) -> None:
@@ -168,13 +181,15 @@ def _received(pipe: BinaryIO) -> Any:
     return marshal.loads(content)  # EOFError where the other side has ended
 
 
-def _end(process: subprocess.Popen) -> None:
+def _end(process: subprocess.Popen, folder: str) -> None:
     process.kill()
     process.communicate()
+    shutil.rmtree(folder, ignore_errors=True)
 
 
-def main(path: str) -> None:
+def main(path: str, folder: str) -> None:
     """Answer what standard input asks, until it ends."""
+    pipe = answers()
     engine: IronCalc | None = None
     told: Cells = {}
     while True:
@@ -183,11 +198,11 @@ def main(path: str) -> None:
         except EOFError:
             return
         try:
-            engine = engine or IronCalc(Path(path))
+            engine = engine or IronCalc(Path(path), folder)
             cells, values = engine.calculated(changes)
             # The same cells each time, unless one was emptied: they are sent once.
             answer = "values", None if cells is told else cells, values
             told = cells
         except KfsheetError as error:
             answer = type(error).__name__, str(error)
-        _send(sys.stdout.buffer, answer)
+        _send(pipe, answer)

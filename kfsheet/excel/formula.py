@@ -42,7 +42,9 @@ def parse_formula(text: str) -> Tree:
     _check_depth(text)
     try:
         node = formualizer.parse(text if text.startswith("=") else f"={text}")
-    except Exception as error:  # formualizer raises its own kinds, and PanicException from Rust
+    except (KeyboardInterrupt, SystemExit):
+        raise
+    except BaseException as error:  # its own kinds and, from Rust, a panic, which is no Exception
         place = re.search(r"position (\d+)", str(error))
         where = f" near its character {int(place[1]) + 1}" if place else ""
         raise FormulaError(f"the formula cannot be read{where}") from None

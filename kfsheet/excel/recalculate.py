@@ -22,6 +22,7 @@ from openpyxl.utils.exceptions import InvalidFileException
 from kfsheet.errors import EngineError, WorkbookError
 from kfsheet.excel.engine import TIMEOUT, Apart, IronCalc, Values
 from kfsheet.excel.stripping import Changes, strip_values
+from kfsheet.processes import completed
 
 # Where installers put it on macOS and Windows without a word to PATH.
 LIBREOFFICE_HOMES = (
@@ -179,7 +180,7 @@ def convert(path: Path, folder: Path, kind: str) -> Path:
             str(path),
         ]
         try:
-            done = subprocess.run(arguments, capture_output=True, text=True, timeout=TIMEOUT)
+            done = completed(arguments, TIMEOUT)
         except subprocess.TimeoutExpired:
             raise EngineError(f"LibreOffice took longer than {TIMEOUT} s") from None
     result = folder / f"{path.stem}.{kind.partition(':')[0]}"
