@@ -53,7 +53,7 @@ def written(rows: int) -> tuple[float, float]:
 
 
 def checking(path: Path) -> Iterator[Line]:
-    """``kfsheet check``: two recalculations and every formula cell beside NumPy."""
+    """``kfsheet check``: recalculations with two sets of inputs, every cell beside NumPy."""
     report = kf.check_workbook(path, cannonball)
     yield Line(
         f"check its {report.cells:,} formulas with IronCalc",

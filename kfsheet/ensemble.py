@@ -118,9 +118,22 @@ class NEES:
         if len(set(states)) < len(states):
             raise DataError(f"NEES names a state twice: {', '.join(states)}")
 
-    def error_columns(self) -> list[str]:
-        """Names of the columns of the errors."""
-        return [self.errors.format(state) for state in self.states]
+    def error_columns(self, model: Recurrence) -> list[str]:
+        """Names of the columns of the errors.
+
+        Raises
+        ------
+        ModelError
+            If the model lacks one.
+        """
+        names = [self.errors.format(state) for state in self.states]
+        known = {c.name for c in model.all_columns()}
+        if missing := [name for name in names if name not in known]:
+            raise ModelError(
+                f"NEES reads the column {missing[0]}, which {model.name} lacks; define the errors, "
+                "and name them as in errors='e_{}_a'"
+            )
+        return names
 
     def covariance_columns(self, model: Recurrence) -> dict[tuple[int, int], str]:
         """Names of the columns of the covariance that the model has, by place, upper triangle.

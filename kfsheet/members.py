@@ -176,7 +176,7 @@ def _kernel(
     printed: Callable[..., Kernel],
 ) -> tuple[Kernel, tuple[tuple[tuple[int, ...], dict[tuple[int, int], int]], ...]]:
     """The kernel, and for each NEES where it stores the errors and their covariance."""
-    specs = [(spec.error_columns(), spec.covariance_columns(model)) for spec in nees.values()]
+    specs = [(spec.error_columns(model), spec.covariance_columns(model)) for spec in nees.values()]
     needed = [*columns, *(name for e, P in specs for name in [*e, *P.values()])]
     wanted = tuple(dict.fromkeys(facts_of(model).wanted(model, needed)))
     kernel = printed(model, model.version, wanted, scalars)
