@@ -1,7 +1,9 @@
 """IronCalc in a process of its own answers like IronCalc in this one, and may fail."""
 
 import datetime
+import os
 import re
+import subprocess
 import time
 import zipfile
 from pathlib import Path
@@ -14,6 +16,7 @@ from kfsheet import EngineError, WorkbookError
 from kfsheet.coursework.engine import calculated
 from kfsheet.excel.engine import Apart, IronCalc
 from kfsheet.excel.recalculate import recalculate
+from kfsheet.processes import completed
 
 FOOTBALL = Path(__file__).parents[1] / "workbooks" / "football.xlsx"
 KICK = {"Parameters": {(5, 2): np.float64(25.0)}}
@@ -108,3 +111,12 @@ def test_an_engine_leaves_no_copy_behind(tmp_path, monkeypatch):
     assert list(tmp_path.rglob("*.xlsx"))
     del apart
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.skipif(os.name == "nt", reason="asks for a process as Unix does")
+def test_a_program_that_is_late_leaves_none_of_those_it_started(tmp_path):
+    started = tmp_path / "pid"
+    with pytest.raises(subprocess.TimeoutExpired):
+        completed(["sh", "-c", f"sleep 60 & echo $! > {started}; wait"], 1)
+    status = Path(f"/proc/{started.read_text().strip()}/stat")
+    assert not status.exists() or ") Z " in status.read_text()  # ended, perhaps not yet waited for
