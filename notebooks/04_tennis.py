@@ -441,8 +441,8 @@ for name, shot in SHOTS.items():
 pd.DataFrame(rows).T
 
 # %% [markdown]
-# $x_2$ and $x_3$ improve 15 to 44 times; depth by nothing, in neither shot. How much of its error is
-# bad luck, that is, differs from draw to draw?
+# $x_2$ and $x_3$ improve 15 to 44 times; depth by nothing, in neither shot. How much of its error
+# is bad luck, that is, differs from draw to draw?
 
 # %%
 for name, shot in SHOTS.items():
@@ -657,16 +657,16 @@ for name, shot in SHOTS.items():
 pd.DataFrame(rows).T
 
 # %% [markdown]
-# In depth our draws err 7 to 22 % less than the theory, the reference's forty others 9 to 18 %
-# more. Who is wrong? Nobody: one direction dominates the error, so forty draws are forty degrees of
-# freedom, and chi-square leaves the rms of nineteen such experiments in twenty between
+# In depth the first forty draws err 7 to 22 % less than the theory, the others between 9 % less and
+# 11 % more. Is something wrong? No: one direction dominates the error, so forty draws are forty
+# degrees of freedom, and chi-square leaves the rms of nineteen such experiments in twenty between
 
 # %%
 print(np.sqrt(chi2.ppf([0.025, 0.975], 40) / 40).round(2).tolist(), "times the theory")
 
 # %% [markdown]
-# Our $x_1$ of B is on the edge; the same noise is in all four rows of ours, so they go together.
-# What would a free $g$ cost?
+# With drag free, the first draws of B are on the edge. The same noise is in both their rows, drag
+# free and known, so these go together. What would a free $g$ cost?
 
 # %%
 rows = {}

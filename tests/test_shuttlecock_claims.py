@@ -37,7 +37,7 @@ def draws(seed):
 
 
 def other_draws(seed):
-    """Another generator: the draws with which the independent figures come out to the last digit."""
+    """Another generator: with its draws the independent figures come out to the last digit."""
     noise = np.random.default_rng(seed).standard_normal((N, 3))
     return dict(zip(("n_x", "n_y", "n_z"), noise.T, strict=True))
 

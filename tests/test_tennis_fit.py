@@ -1,4 +1,4 @@
-"""The fit of pixels, against theory, independent fits and the truth; and the impact it foretells."""
+"""The fit of pixels, against theory, independent fits and the truth; the impact it foretells."""
 
 from dataclasses import replace
 from decimal import Decimal

@@ -147,8 +147,8 @@ def forty():
 def test_the_loop_errs_as_an_independent_one_does(forty, name, independent):
     """Forty draws each, other ones. In x3 B errs by 1.48 mm here, and by 1 mm there, rounded.
 
-    The independent figures are rounded to a millimetre: the band is half a
-    millimetre and three and a half standard errors of the difference of both.
+    The independent figures are rounded to a millimetre: the band is half a millimetre and three and
+    a half standard errors of the difference of both.
     """
     squares = np.mean(forty[name][1] ** 2, axis=1)
     rms = np.sqrt(squares.mean(axis=0))
