@@ -156,16 +156,24 @@ chance(10_000).round(4)
 
 # %% [markdown]
 # So an error ratio is known to 0.7 %. We take the bounds that only one sweep in a thousand passes
-# by chance, 3.3 deviations on either side, and list for each figure its extremes, and the first and
-# the last sweep outside.
+# by chance, 3.3 deviations on either side.
+
+
+# %%
+def outside(found, members):
+    kind = [name.split()[0] for name in found]
+    mean, deviation = chance(members).loc[kind].to_numpy().T
+    return (found - mean).abs() > 3.3 * deviation
+
+
+# %% [markdown]
+# For each figure we list its extremes, in how many sweeps it is outside, and the first and the last
+# of these.
 
 
 # %%
 def judged(found, members):
-    kind = [name.split()[0] for name in found]
-    mean, deviation = chance(members).loc[kind].to_numpy().T
-    out = (found - mean).abs() > 3.3 * deviation
-    sweep = found.index.to_series()
+    out, sweep = outside(found, members), found.index.to_series()
     table = {"lowest": found.min(), "at": found.idxmin()}
     table |= {"highest": found.max(), "at ": found.idxmax(), "outside": out.sum()}
     table |= {
@@ -177,17 +185,16 @@ def judged(found, members):
 
 # %% [markdown]
 # Now the verdict on the ten thousand flights: ten figures of 1,319 sweeps each. By chance alone,
-# each figure would be outside in one or two sweeps, somewhere.
+# each figure would be outside in one or two sweeps, on average.
 
 # %%
-verdict = judged(found, 10_000)
-assert verdict["last"].max() < 130
-verdict
+judged(found, 10_000)
 
 # %% [markdown]
 # **Not honest, but only early.** In $y$ it errs up to 8.3 % less than it claims (outside from 0.5
-# to 3.8 s), in $x$ 3.2 % and in $v_x$ 2.7 % less (at 3 and 5 s), in $v_y$ up to 9.1 % *more* (until
-# 9.3 s). The NEES is too large until 6 s, the NIS never strange. After 12.5 s nothing is.
+# to 3.8 s), in $x$ 3.2 % less (at 3 s), in $v_x$ first 2.6 % more (at 0.6 s), then 2.7 % less (at 5
+# s), in $v_y$ up to 9.1 % *more* (until 9.3 s). The NEES is too large until 6 s, the NIS never
+# strange. After 12.5 s nothing is.
 
 # %%
 COLOURS = dict(zip(STATE, ("#0072B2", "#56B4E9", "#D55E00", "#E69F00"), strict=True))
@@ -227,18 +234,17 @@ for ax, name in zip(axes, ("NIS", "NEES"), strict=True):
 # %% [markdown]
 # The NIS, which needs no truth, is noise from beginning to end and has noticed nothing. The NEES is
 # too large in the marked seconds, and only there. With the usual 95 % bounds, how many sweeps are
-# outside, and which?
+# outside, and how many of the 67 that are marked?
 
 # %%
 low, high = chi2.interval(0.95, 4 * 10_000)
-above = found.index[found["NEES"] > high / 10_000].tolist()
-assert above == list(range(1, len(above) + 1))
-assert found["NEES"].min() > low / 10_000
-print(f"{len(above)} sweeps of {len(found)}, {len(above) / len(found):.0%}: 1 to {above[-1]}")
+out = ~found["NEES"].between(low / 10_000, high / 10_000)
+assert out.loc[:67].mean() > 0.9
+print(f"{out.sum()} sweeps of {len(out)}, {out.mean():.0%}; of the first 67, {out.loc[:67].sum()}")
 
 # %% [markdown]
 # Five percent of the sweeps are outside 95 % bounds: as a share that looks like a pass. But they
-# are the first 67, all of them, and no other. Count where, not only how many.
+# are the first 67, all of them, and with these draws no other. Count where, not only how many.
 
 # %% [markdown]
 # ## Is it the curvature?
@@ -326,8 +332,9 @@ left.join(mean).loc[[1, 17, 33, 67, 200], ["x", "x, A b", "y", "y, A b", "vy", "
 
 # %% [markdown]
 # The flights share an error: after 3.3 s the mean $v_y$ is still 25 m/s too large, as $A_k b$ says.
-# In $y$ it is soon gone: the ball is thought 305 m too low, but 30 m/s too fast upwards. At sweep 1
-# the two differ by 4 m, later by half a metre.
+# In $y$ it changes sign: the ball is thought 305 m too low, but 30 m/s too fast upwards, and so, at
+# 3.3 s, 31 m too high; at 20 s that is gone. At sweep 1 the two differ by 4 m, later by half a
+# metre at most.
 
 # %% [markdown]
 # The covariance of the real errors is then $P_a + A (b b' - P_0) A'$, and every figure of an error
@@ -345,28 +352,31 @@ def expected(b):
 
 # %% [markdown]
 # Smallest and largest value of each figure over the sweeps, as expected and as measured; the latter
-# also holds what chance adds, some two percent in a thousand sweeps.
+# also holds what chance adds, some two percent in a thousand sweeps. They must differ by less than
+# the nine percent that are to be explained.
 
 # %%
 theory = expected(b)
 both = {"expected": theory, "measured": found[theory.columns]}
-assert (theory - found)[ERRORS].abs().max().max() < 0.03
+assert (theory - found)[ERRORS].abs().max().max() < 0.05
 pd.concat({k: f.agg(["min", "max"]).T for k, f in both.items()}, axis=1).round(3)
 
 # %% [markdown]
-# Without a flight, from four numbers, the algebra gives the extremes of the errors to about one
-# percent, and 4.20 for the NEES where 4.18 was measured. Where the extremes lie must fit as well:
-# measured lines are full, expected ones dashed, in the colours of before.
+# Without a flight, from four numbers, the algebra gives the extremes of the errors to 1.7 %, which
+# chance may add, and 4.20 for the NEES where 4.18 was measured. Where the extremes lie must fit as
+# well: measured lines are full, expected ones dashed.
 
 # %%
 fig, axes = plt.subplots(1, 2, figsize=(12, 3.8), layout="constrained")
 for frame, line in ((found, "-"), (theory, "--")):
     panel(axes[0], frame, ERRORS, "real error / claimed error", ls=line)
     panel(axes[1], frame, ["NEES"], "mean NEES", ls=line)
+axes[0].legend(handles=axes[0].lines[:4], frameon=False)
+_ = axes[1].legend(axes[1].lines, ["measured", "expected"], frameon=False)
 
 # %% [markdown]
-# They do, for the NEES a little lower than expected. **It is the start**: ten thousand flights with
-# one and the same error.
+# They do, for the NEES mostly a little lower than expected. **It is the start**: ten thousand
+# flights with one and the same error.
 
 # %% [markdown]
 # But why is the claim too large for $y$, too small for $v_y$, and too small for all four together?
@@ -413,13 +423,11 @@ def drawn(members, seed=7):
 
 # %%
 fair = measured(fly(10_000, **start(1, drawn(10_000))))
-verdict = judged(fair, 10_000)
-assert not verdict["outside"].any()
-verdict
+judged(fair, 10_000)
 
 # %% [markdown]
-# **Honest.** Of 13,190 figures none is outside; the errors stay within 2.1 % of what is claimed,
-# the NEES between 3.945 and 4.032. In pictures, on the axes and in the colours of before:
+# Of 13,190 figures none is outside. That is even a little lucky, since one in a thousand is 13. In
+# pictures, on the axes of before:
 
 # %%
 fig, axes = plt.subplots(1, 3, figsize=(12, 3.8), layout="constrained")
@@ -428,10 +436,45 @@ panel(axes[1], fair, COVERAGE, "share within 2 sigma")
 panel(axes[2], fair, ["NEES"], "mean NEES")
 for ax, limits in zip(axes, ((0.91, 1.1), (0.94, 1.002), (3.9, 4.2)), strict=True):
     ax.set_ylim(limits)
+_ = [ax.legend(frameon=False) for ax in axes[:2]]
 
 # %% [markdown]
-# All lines stay within their bands at all times, in the first ten seconds as in the last, and what
-# is left of structure is the memory of a filter: a flight that errs, errs for long.
+# What is left of structure is the memory of a filter: a flight that errs, errs for long, and errors
+# of neighbouring sweeps go together. So outsiders come in clumps: other draws have none, or dozens,
+# and the number alone proves little. We count where they are, how many runs of sweeps they form,
+# how long the longest is, and how many of its deviations an error is away from 1.
+
+
+# %%
+def clumps(found, members):
+    out = outside(found, members)
+    first = out & ~out.shift(fill_value=False)
+    longest = max(out[name].groupby(first[name].cumsum()).sum().max() for name in out)
+    counts = [int(kind.sum().sum()) for kind in (out.loc[:125], out, first)]
+    furthest = (found[ERRORS] - 1).abs().max().max() * (2 * members) ** 0.5
+    return [members, *counts, int(longest), round(float(furthest), 1)]
+
+
+# %% [markdown]
+# Three more studies, of 4,000 flights, each with its own noise of the radar and its own starts. On
+# average, chance puts 13 figures outside, 1.2 of them among the 1,250 of the first 12.5 s. However
+# they clump, a hundred times that mean is reached by one study in a hundred at most (Markov's
+# inequality); so 125 is our limit.
+
+# %%
+lines = {"common start": clumps(found, 10_000), "drawn, seed 1": clumps(fair, 10_000)}
+for seed in (2, 3, 4):
+    other = measured(fly(4000, seed=seed, **start(1, drawn(4000, seed=6 + seed))))
+    lines[f"drawn, seed {seed}"] = clumps(other, 4000)
+head = ["flights", "until 12.5 s", "outside", "runs", "longest", "furthest error"]
+early = [line[1] for line in lines.values()]
+assert early[0] > 125 > max(early[1:])
+pd.DataFrame(lines, head).T.astype(dict.fromkeys(head[:-1], int))
+
+# %% [markdown]
+# **Honest, as far as these flights can tell.** Outside are 0, 19, 1 and 10 figures, in runs of up
+# to ten sweeps, and no error is further than 3.7 deviations, where the common start has 12.8. No
+# seed repeats the early block: at most one figure is outside there, instead of 367.
 
 # %% [markdown]
 # ## Where the curvature does show
@@ -599,8 +642,8 @@ found_q = calm["Phi_s"]
 print(f"q below 0.0002 in {(found_q < 2e-4).sum()} of 20 flights, largest {found_q.max():.3f}")
 
 # %% [markdown]
-# Most flights give zero, as good as exactly, and none more than 0.003 m²/s³, a thirtieth of what
-# was costly above. An estimate at the edge of what is possible has no symmetric spread.
+# In 14 flights $q$ is less than a five-hundredth of what was costly above, 0.1 m²/s³, and in none
+# more than a thirtieth. An estimate at the edge of what is possible has no symmetric spread.
 
 # %% [markdown]
 # A world with a known $q$ must be recognised too. Gusts push the ball about, white noise of $\Phi_s
@@ -698,9 +741,10 @@ table.round(2)
 # %% [markdown]
 # ## So, is it honest?
 #
-# **Yes, if the start is what the filter was promised.** Over 10,000 flights with drawn starts
+# **Yes, if the start is what the filter was promised.** Over 10,000 flights with drawn starts,
 # errors are within 2.1 % of the claim and coverage within 0.7 points of 95.4 %, in all four
-# directions and all 1,319 sweeps: no more than chance.
+# directions and all 1,319 sweeps. Other draws put a few figures outside their bounds, in clumps and
+# not early: no more than chance.
 #
 # **Not as the workbook starts it.** If every flight begins with the same error, then in the first
 # seconds it errs up to 8 % less than claimed in $y$, up to 9 % more in $v_y$, and the NEES is up to
