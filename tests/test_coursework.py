@@ -84,6 +84,55 @@ def test_exports_hold_no_formula():
     assert harmless("Ada") == "Ada"
 
 
+@pytest.fixture
+def small(tmp_path):
+    """A course of one student, and the call that hands out."""
+    (tmp_path / "roster.csv").write_text("id,name\nq7,Ada\n")
+    ask = ("handout", "football", "--roster", tmp_path / "roster.csv", "--out", tmp_path / "out")
+    return tmp_path, ask
+
+
+def test_the_first_handout_says_where_the_secret_is(small, capsys):
+    home, ask = small
+    assert call(*ask) == 0
+    words = f"made the secret of the course: {home / 'kfsheet.secret'}; keep it, and to yourself"
+    assert words in capsys.readouterr().out
+    assert call(*ask) == 0, "the same bytes again"
+    assert "made the secret" not in capsys.readouterr().out
+
+
+def test_a_lost_or_another_secret_does_not_replace_what_was_handed_out(small, capsys):
+    home, ask = small
+    assert call(*ask) == 0
+    path = home / "out/students/q7/football.xlsx"
+    before, secret = path.read_bytes(), (home / "kfsheet.secret").read_text()
+    assert secret.strip() not in (home / "out/kfsheet.json").read_text()
+    (home / "kfsheet.secret").unlink()
+    assert call(*ask, "--force") == 2
+    assert "--secret" in capsys.readouterr().err
+    assert not (home / "kfsheet.secret").exists()
+    read_secret(home / "other", make=True)
+    assert call(*ask, "--secret", home / "other", "--force") == 2
+    assert "another secret" in capsys.readouterr().err
+    assert path.read_bytes() == before
+    (home / "kfsheet.secret").write_text(secret)
+    assert call(*ask) == 0
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_handout_that_would_change_is_replaced_by_force_only(small, jobs, capsys):
+    home, ask = small
+    assert call(*ask) == 0
+    path = home / "out/students/q7/football.xlsx"
+    before = path.read_bytes()
+    (home / "roster.csv").write_text("id,name\nq7,Ada Lovelace\n")
+    assert call(*ask, "--jobs", jobs) == 2
+    assert "--force" in capsys.readouterr().err
+    assert path.read_bytes() == before
+    assert call(*ask, "--jobs", jobs, "--force") == 0
+    assert path.read_bytes() != before
+
+
 # -- handouts ------------------------------------------------------------------------------------
 
 
@@ -459,6 +508,18 @@ def test_a_secret_that_fits_no_file_is_told(course, tmp_path, capsys):
     ask = ("--roster", home / "roster.csv", "--secret", tmp_path / "other")
     assert call("grade", "football", sub, *ask, "--out", tmp_path / "g") == 1
     assert "is --secret the right file?" in capsys.readouterr().err
+
+
+def test_two_exercises_do_not_share_a_folder_of_results(course, tmp_path, capsys):
+    _, ask, _ = course
+    (tmp_path / "in").mkdir()
+    out = ("--out", tmp_path / "g")
+    assert call("grade", "football", tmp_path / "in", *ask, *out) == 0
+    before = {p.name: p.read_bytes() for p in (tmp_path / "g").iterdir() if p.is_file()}
+    assert call("grade", "cannonball", tmp_path / "in", *ask, *out) == 2
+    assert "holds the results of football" in capsys.readouterr().err
+    assert {p.name: p.read_bytes() for p in (tmp_path / "g").iterdir() if p.is_file()} == before
+    assert call("grade", "football", tmp_path / "in", *ask, *out) == 0
 
 
 def test_reports_inside_the_folder_of_submissions_are_no_submissions(course, tmp_path):
