@@ -13,8 +13,9 @@ import students as do
 from students import ADA, SECRET, Paper
 
 from kfsheet import DataError, ModelError, cli, load_exercise
+from kfsheet.coursework.assessing import Assessment
 from kfsheet.coursework.collecting import owner
-from kfsheet.coursework.grading import _fingerprint, grade
+from kfsheet.coursework.grading import Handed, _fingerprint, _result, grade
 from kfsheet.coursework.handout import handout_bytes, own_run
 from kfsheet.coursework.judge import Mark
 from kfsheet.coursework.marking import _with_words
@@ -366,7 +367,37 @@ def test_everybody_on_the_roster_has_a_row_with_score_and_status(graded):
         "s007": ("0", "no submission"),
     }
     assert (rows["s003"]["K_x"], rows["s003"]["u"], rows["s003"]["w"]) == ("0", "0", "2")
-    assert "2 files came back; the newest counts" in rows["s003"]["remark"]
+    assert rows["s003"]["remark"] == (
+        "2 files came back; the newest with answers counts (capekzoe_1_3_new.xlsx), "
+        "not (capekzoe_1_2_old.xlsx: untouched)"
+    )
+
+
+def marks_of(name, points):
+    return [Mark(name, 9, points, "right", "")]
+
+
+@pytest.mark.parametrize(
+    ("later", "score", "words"),
+    [
+        (Assessment("untouched", "", "s001", marks_of("u", 0.0)), 7, "(1.xlsx: untouched)"),
+        (Assessment("damaged", "cannot be opened"), 7, "(1.xlsx: damaged)"),
+        (Assessment("timed out", "too long"), 7, "(1.xlsx: timed out)"),
+        (Assessment("graded", "", "s002", marks_of("u", 9.0)), 7, "somebody else's file"),
+        (Assessment("graded", "", "s001", marks_of("u", 3.0)), 3, "with different scores"),
+    ],
+)
+def test_a_later_file_without_answers_takes_no_marks_away(tmp_path, later, score, words):
+    ada, earlier = STUDENTS[0], Assessment("graded", "", "s001", marks_of("u", 7.0))
+    handed = []
+    for n, found in enumerate((earlier, later)):
+        (tmp_path / f"{n}.xlsx").touch()
+        os.utime(tmp_path / f"{n}.xlsx", (1e9 + n, 1e9 + n))
+        handed.append(Handed(tmp_path / f"{n}.xlsx", ada, str(n), found))
+    result = _result(ada, handed, 9)
+    assert (result.status, result.score) == ("graded", score)
+    assert words in result.remark
+    assert "2 files came back" in result.remark
 
 
 def test_every_process_writes_the_same_workbook(course):

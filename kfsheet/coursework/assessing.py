@@ -41,6 +41,11 @@ class Assessment:
     final: bool = True
     """Whether it would be the same on a machine that has more time."""
 
+    @property
+    def score(self) -> float:
+        """Points of all answers."""
+        return sum(mark.score for mark in self.marks)
+
     def as_dict(self) -> dict[str, Any]:
         """For a file of results."""
         return asdict(self)
