@@ -261,6 +261,7 @@ def run_grade(arguments: argparse.Namespace) -> int:
     """Grade a folder of submissions; a bad file is a status in the table, not an error."""
     from kfsheet.coursework.assessing import NO_TOKEN
     from kfsheet.coursework.belonging import belongs_to, claim
+    from kfsheet.coursework.collecting import passed_over
     from kfsheet.coursework.grading import grade, override
     from kfsheet.coursework.overrides import read_overrides, with_all_marks
     from kfsheet.coursework.reports import write_reports
@@ -290,6 +291,10 @@ def run_grade(arguments: argparse.Namespace) -> int:
         print(path)
     statuses = Counter(result.status for result in results)
     print("; ".join(f"{status}: {count}" for status, count in statuses.most_common()))
+    if lost := sum(file.of_nobody for file in handed):
+        print(f"files that belong to nobody: {lost}; see the end of {out / 'class.html'}")
+    if skipped := [path.name for path in passed_over(arguments.submissions, out)]:
+        print(f"files passed over: {len(skipped)} ({', '.join(skipped[:5])})")
     found = [file.assessment for file in handed]
     if any(a.status == NO_TOKEN for a in found) and not any(a.student for a in found):
         complain(DataError("no file carries a token of this course; is --secret the right file?"))

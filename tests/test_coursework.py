@@ -4,6 +4,7 @@ import csv
 import os
 import shutil
 import time
+import zipfile
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -531,6 +532,24 @@ def test_a_corrected_exercise_leaves_no_old_marks(course, tmp_path):
     fewer = replace(FOOTBALL, questions=tuple(q for q in FOOTBALL.questions if q is not key))
     assert _fingerprint(FOOTBALL) == _fingerprint(load_exercise("football"))
     assert len({_fingerprint(FOOTBALL), _fingerprint(fewer)}) == 2
+
+
+def test_files_of_nobody_and_files_passed_over_are_told(course, tmp_path, capsys):
+    """A zip of the whole class, a page and notes of the platform, a link."""
+    _, ask, sub = course
+    (tmp_path / "in" / "a").mkdir(parents=True)
+    with zipfile.ZipFile(tmp_path / "in" / "class.zip", "w") as archive:
+        archive.write(sub / "x" / "football (2).xlsx", "s002/football.xlsx")
+    for name in ("notes.txt", "a/page.html", ".DS_Store"):
+        (tmp_path / "in" / name).write_text("x")
+    (tmp_path / "in" / "link.xlsx").symlink_to(sub / "x" / "football (2).xlsx")
+    assert call("grade", "football", tmp_path / "in", *ask, "--out", tmp_path / "in/g") == 0
+    out = capsys.readouterr().out
+    assert "files that belong to nobody: 1" in out
+    assert "files passed over: 4 (.DS_Store, " in out
+    page = (tmp_path / "in/g/class.html").read_text().partition("Files that belong to nobody")[2]
+    for words in ("class.zip", "wrong kind", "unpack it first", "named by its student"):
+        assert words in page
 
 
 def test_a_secret_that_fits_no_file_is_told(course, tmp_path, capsys):

@@ -74,6 +74,11 @@ class Handed:
     key: str
     assessment: Assessment
 
+    @property
+    def of_nobody(self) -> bool:
+        """Whether neither a token nor the path says whose the file is."""
+        return not self.assessment.student and self.owner is None
+
 
 def grade(
     exercise: Exercise,
