@@ -237,6 +237,17 @@ def test_feedback_is_live_and_gives_no_number_away(handout, engine, tmp_path):
     assert words()[0] == NOT_YET
 
 
+def test_the_sheet_of_questions_says_what_a_check_number_is(handout):
+    sheet = openpyxl.load_workbook(handout)["Questions"]
+    words = " ".join(str(c.value) for row in sheet.iter_rows(max_row=FIRST - 1) for c in row)
+    assert "A typed number may look right here and earns nothing." in words
+    assert "still shows 'not yet' while an answer it depends on is wrong" in words
+    heads = [cell.value for cell in sheet[FIRST - 1]]
+    assert heads[5:7] == ["check number: yours", "check number: wanted"]
+    read_me = openpyxl.load_workbook(handout)["Read me"]
+    assert "notebook" not in [cell.value for cell in read_me["A"]], "it holds the formulas"
+
+
 def test_a_solution_is_a_sound_workbook(tmp_path):
     from kfsheet.coursework.handout import solution_bytes
 

@@ -164,7 +164,7 @@ def handout_bytes(exercise: Exercise, student: Student, secret: bytes) -> bytes:
 
 def handout_pages(exercise: Exercise, layout: Layout, now: Run) -> list[Page]:
     """The exercise's worksheets with empty answers, without "Check", which knows the answers."""
-    words = replace(exercise, about=(YOURS, exercise.about[0]))
+    words = replace(exercise, about=(YOURS, exercise.about[0]), notebook="")
     pages = [p for p in compose(words, layout, now, now) if p.title != "Check"]
     by_title = {page.title: page for page in pages}
     for question in exercise.questions:
