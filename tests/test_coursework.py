@@ -7,6 +7,7 @@ import time
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from pathlib import Path
 
 import openpyxl
 import pytest
@@ -16,9 +17,9 @@ from students import ADA, SECRET, Paper
 from kfsheet import DataError, ModelError, cli, load_exercise
 from kfsheet.coursework.assessing import Assessment
 from kfsheet.coursework.collecting import owner
-from kfsheet.coursework.grading import Handed, _fingerprint, _result, grade
+from kfsheet.coursework.grading import STATUSES, Handed, _fingerprint, _result, grade
 from kfsheet.coursework.handout import handout_bytes, own_run
-from kfsheet.coursework.judge import Mark
+from kfsheet.coursework.judge import CREDIT, Mark
 from kfsheet.coursework.marking import _with_words
 from kfsheet.coursework.questions import FIRST, LOOKS_RIGHT, NOT_YET
 from kfsheet.coursework.roster import Student, harmless, read_roster
@@ -248,6 +249,18 @@ def test_the_sheet_of_questions_says_what_a_check_number_is(handout):
     assert "notebook" not in [cell.value for cell in read_me["A"]], "it holds the formulas"
 
 
+def test_points_stand_on_the_sheet_of_questions_only(handout):
+    book = openpyxl.load_workbook(handout)
+    told = {s.title for s in book for row in s.values for v in row if "points" in str(v).split()}
+    assert told == {"Questions"}
+    assert book["Reanalysis"]["G3"].value == FOOTBALL.model.column("x_f").description
+
+
+def test_check_says_what_a_handout_is_for(handout, capsys):
+    assert call("check", handout) == 2
+    assert "is a student's handout; use: kfsheet grade" in capsys.readouterr().err
+
+
 def test_a_solution_is_a_sound_workbook(tmp_path):
     from kfsheet.coursework.handout import solution_bytes
 
@@ -447,6 +460,9 @@ def test_every_student_gets_the_own_workbook_with_marks_beside_the_answers(grade
     assert book["Reanalysis"]["G3"].fill.start_color.rgb == "FFC6EFCE"
     assert book["Parameters"]["D23"].value == "2/2: right."
     assert book["Charts"]._charts
+    page = book["Marks"].page_setup
+    assert (page.orientation, page.fitToHeight) == ("landscape", 0)
+    assert book["Marks"].sheet_properties.pageSetUpPr.fitToPage
     values = recalculate(marked, engine)
     scores = [values["Marks"][row, 3] for row in range(2, 13)]
     assert values["Marks"][12, 1] == "total"
@@ -485,6 +501,7 @@ def test_a_second_run_goes_on_and_keeps_what_a_lecturer_changed(course, graded):
     assert time.monotonic() - start < 30
     rows = {row["id"]: row for row in table(graded / "grades.csv")}
     assert (rows["s002"]["score"], rows["s002"]["u"]) == ("17.5", "1.5")
+    assert rows["s002"]["remark"] == "u: half seen"
     assert (rows["s007"]["score"], rows["s007"]["remark"]) == ("9", "oral")
     assert (graded / "overrides.csv").read_bytes() == before
     again = {p.name: p.stat().st_mtime_ns for p in (graded / "work").glob("*.json")}
@@ -569,6 +586,12 @@ def test_a_secret_that_fits_no_file_is_told(course, tmp_path, capsys):
     ask = ("--roster", home / "roster.csv", "--secret", tmp_path / "other")
     assert call("grade", "football", sub, *ask, "--out", tmp_path / "g") == 1
     assert "is --secret the right file?" in capsys.readouterr().err
+
+
+def test_readme_has_a_row_for_every_status():
+    readme = (Path(__file__).parents[1] / "README.md").read_text()
+    for status in (*STATUSES, *CREDIT):
+        assert f"| {status} |" in readme, status
 
 
 def test_two_exercises_do_not_share_a_folder_of_results(course, tmp_path, capsys):

@@ -130,7 +130,7 @@ def test_an_untouched_handout_scores_nothing_and_is_called_so(name, handouts, tm
     (tmp_path / "a.xlsx").write_bytes(handouts(name))
     found = assess(paper.exercise.name, SECRET, tmp_path / "a.xlsx")
     assert found.status == "untouched"
-    assert {(m.score, m.status) for m in found.marks} == {(0.0, "empty")}
+    assert {(m.score, m.status, m.remark) for m in found.marks} == {(0.0, "empty", "")}
 
 
 @pytest.mark.parametrize("name", exercise_names())

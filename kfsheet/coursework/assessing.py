@@ -14,12 +14,12 @@ from kfsheet.coursework.handout import TOKEN_PROPERTY
 from kfsheet.coursework.judge import Judge, Mark
 from kfsheet.coursework.marking import mark_workbook
 from kfsheet.coursework.places import named_cell
-from kfsheet.coursework.questions import TOKEN_NAME
 from kfsheet.coursework.recalculating import Recalculation
 from kfsheet.coursework.submission import Book, read_submission
 from kfsheet.coursework.variation import own_numbers
 from kfsheet.coursework.worlds import Scene
 from kfsheet.errors import KfsheetError, SubmissionError
+from kfsheet.excel.layout import TOKEN_NAME
 from kfsheet.exercise import Exercise
 from kfsheet.exercises import load_exercise
 from kfsheet.files import write_file

@@ -260,6 +260,8 @@ def override(results: list[Result], lines: Iterator[dict[str, Any]]) -> list[Res
         if not line["question"]:
             result.override, result.remark = line["score"], remark
             continue
+        words = f"{line['question']}: {remark}"
+        result.remark = f"{result.remark}; {words}" if result.remark else words
         result.marks = [
             replace(m, score=line["score"], remark=remark) if m.name == line["question"] else m
             for m in result.marks

@@ -168,16 +168,12 @@ def handout_pages(exercise: Exercise, layout: Layout, now: Run) -> list[Page]:
     pages = [p for p in compose(words, layout, now, now) if p.title != "Check"]
     by_title = {page.title: page for page in pages}
     for question in exercise.questions:
-        words = f"{question.points} point{'s' * (question.points > 1)}: {question.hint}"
         if question.name in layout.scalars:
             sheet, row, column = layout.scalars[question.name]
             _empty(by_title[sheet], (row, column))
-            by_title[sheet].put(row, column + 2, words, "words", align="wrap")
             continue
         sheet, column = layout.home(question.name)
-        meant = exercise.model.column(question.name).description
-        by_title[sheet].put(3, column, f"{meant}. {words}", "words", align="wrap")
-        by_title[sheet].heights[3] = 110
+        by_title[sheet].heights[3] = 80  # there is the mark's place, later
         for step in asked_steps(exercise.model, question.name):
             _empty(by_title[sheet], (FIRST_ROW + step, column))
     for section in exercise.frozen:

@@ -196,6 +196,8 @@ class Judge:
         if right:
             words = f"right in {_rows(right)}; {self._where(rest, right)}: {words}"
             status = PARTLY if len(right) >= len(rest) else status
+        elif status == EMPTY:
+            words = ""  # the status says it
         score = asked.points * CREDIT.get(status, 0.0)
         return Mark(asked.name, asked.points, score, status, words, fingerprint)
 

@@ -178,4 +178,7 @@ def _sheet(marks: Sequence[Mark], numbers: dict[str, int], total: float | None) 
         for row, (cells, style) in enumerate(lines, 1)
     )
     columns = '<cols><col min="1" max="4" width="14"/><col min="5" max="5" width="90"/></cols>'
-    return f'<worksheet xmlns="{MAIN}">{columns}<sheetData>{rows}</sheetData></worksheet>'
+    fit = '<sheetPr><pageSetUpPr fitToPage="1"/></sheetPr>'
+    print_as = '<pageSetup paperSize="9" orientation="landscape" fitToWidth="1" fitToHeight="0"/>'
+    content = f"{fit}{columns}<sheetData>{rows}</sheetData>{print_as}"
+    return f'<worksheet xmlns="{MAIN}">{content}</worksheet>'

@@ -17,14 +17,13 @@ from openpyxl.workbook import Workbook
 from kfsheet.coursework import tokens
 from kfsheet.errors import ModelError
 from kfsheet.excel.compose import Run
-from kfsheet.excel.layout import FIRST_ROW, Layout, quote
+from kfsheet.excel.layout import FIRST_ROW, TOKEN_NAME, Layout, quote
 from kfsheet.excel.page import Page
 from kfsheet.exercise import Exercise, Question
 
 SHEET, HIDDEN = "Questions", "kfsheet"
 FIRST, MODULUS = 7, 997
 LOOKS_RIGHT, NOT_YET = "looks right", "not yet"
-TOKEN_NAME = "kfsheet_token"
 YOURS, WANTED = "check number: yours", "check number: wanted"
 HEADS = ("answer", "points", "where", "what to do", "filled in", YOURS, WANTED, "feedback")
 WIDTHS = {1: 14, 2: 8, 3: 22, 4: 64, 5: 10, 6: 22, 7: 22, 8: 14, 10: 12, 11: 12}
