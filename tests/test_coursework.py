@@ -460,6 +460,9 @@ def test_every_student_gets_the_own_workbook_with_marks_beside_the_answers(grade
     assert book["Reanalysis"]["G3"].fill.start_color.rgb == "FFC6EFCE"
     assert book["Parameters"]["D23"].value == "2/2: right."
     assert book["Charts"]._charts
+    heights = book["Marks"].row_dimensions
+    remarks = {row: len(book["Marks"].cell(row, 5).value or "") for row in range(2, 12)}
+    assert all(heights[row].height >= 15 * length / 90 for row, length in remarks.items())
     page = book["Marks"].page_setup
     assert (page.orientation, page.fitToHeight) == ("landscape", 0)
     assert book["Marks"].sheet_properties.pageSetUpPr.fitToPage
