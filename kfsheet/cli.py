@@ -105,6 +105,9 @@ def _add_coursework(commands: argparse._SubParsersAction, exercise: str) -> None
     handout.add_argument(
         "--notebook", action="store_true", help="also write an assignment for nbgrader"
     )
+    handout.add_argument(
+        "--force", action="store_true", help="also replace handouts that would become others"
+    )
     handout.set_defaults(run=run_handout)
     grade.set_defaults(run=run_grade)
 
@@ -204,11 +207,26 @@ def run_show(arguments: argparse.Namespace) -> int:
     return HOLDS
 
 
-def _secret(arguments: argparse.Namespace, *, make: bool) -> bytes:
+def _secret_path(arguments: argparse.Namespace) -> Path:
+    return Path(arguments.secret or Path(arguments.roster).parent / "kfsheet.secret")
+
+
+def _secret_of_handouts(arguments: argparse.Namespace) -> bytes:
+    """The secret, which is made where nothing was handed out yet."""
+    from kfsheet.coursework.handout import holds_handouts
     from kfsheet.coursework.tokens import read_secret
 
-    default = Path(arguments.roster).parent / "kfsheet.secret"
-    return read_secret(arguments.secret or default, make=make)
+    path = _secret_path(arguments)
+    if path.exists():
+        return read_secret(path)
+    if holds_handouts(arguments.out):
+        raise DataError(
+            f"{arguments.out} holds handouts, and there is no secret {path}; give theirs with "
+            "--secret: a new one could not grade them (to begin anew, choose another --out)"
+        )
+    secret = read_secret(path, make=True)
+    print(f"made the secret of the course: {path}; keep it, and to yourself")
+    return secret
 
 
 def run_handout(arguments: argparse.Namespace) -> int:
@@ -219,9 +237,14 @@ def run_handout(arguments: argparse.Namespace) -> int:
 
     exercise = load_exercise(arguments.exercise)
     students = read_roster(arguments.roster)
-    secret = _secret(arguments, make=True)
     made = write_handouts(
-        exercise, arguments.exercise, students, secret, arguments.out, jobs=arguments.jobs
+        exercise,
+        arguments.exercise,
+        students,
+        _secret_of_handouts(arguments),
+        arguments.out,
+        jobs=arguments.jobs,
+        force=arguments.force,
     )
     for _ in progress(made, "handout", len(students), lambda path: path.parent.name):
         pass
@@ -237,22 +260,28 @@ def run_handout(arguments: argparse.Namespace) -> int:
 def run_grade(arguments: argparse.Namespace) -> int:
     """Grade a folder of submissions; a bad file is a status in the table, not an error."""
     from kfsheet.coursework.assessing import NO_TOKEN
+    from kfsheet.coursework.belonging import belongs_to, claim
+    from kfsheet.coursework.collecting import passed_over
     from kfsheet.coursework.grading import grade, override
     from kfsheet.coursework.overrides import read_overrides, with_all_marks
     from kfsheet.coursework.reports import write_reports
     from kfsheet.coursework.roster import read_roster
+    from kfsheet.coursework.tokens import read_secret
     from kfsheet.exercises import load_exercise
 
     exercise = load_exercise(arguments.exercise)
     students = read_roster(arguments.roster)
     out = Path(arguments.out)
+    if not claim(out, "graded", exercise.name):
+        other = belongs_to(out, "graded")
+        raise DataError(f"{out} holds the results of {other}; give another --out")
     lines = read_overrides(out / "overrides.csv", exercise, {s.id for s in students})
     results, handed = grade(
         exercise,
         arguments.exercise,
         arguments.submissions,
         students,
-        _secret(arguments, make=False),
+        read_secret(_secret_path(arguments)),
         out,
         jobs=arguments.jobs,
         progress=lambda items, count: progress(items, "grade", count, _judged),
@@ -262,6 +291,10 @@ def run_grade(arguments: argparse.Namespace) -> int:
         print(path)
     statuses = Counter(result.status for result in results)
     print("; ".join(f"{status}: {count}" for status, count in statuses.most_common()))
+    if lost := sum(file.of_nobody for file in handed):
+        print(f"files that belong to nobody: {lost}; see the end of {out / 'class.html'}")
+    if skipped := [path.name for path in passed_over(arguments.submissions, out)]:
+        print(f"files passed over: {len(skipped)} ({', '.join(skipped[:5])})")
     found = [file.assessment for file in handed]
     if any(a.status == NO_TOKEN for a in found) and not any(a.student for a in found):
         complain(DataError("no file carries a token of this course; is --secret the right file?"))

@@ -4,8 +4,10 @@ import csv
 import os
 import shutil
 import time
+import zipfile
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from pathlib import Path
 
 import openpyxl
 import pytest
@@ -13,10 +15,11 @@ import students as do
 from students import ADA, SECRET, Paper
 
 from kfsheet import DataError, ModelError, cli, load_exercise
+from kfsheet.coursework.assessing import Assessment
 from kfsheet.coursework.collecting import owner
-from kfsheet.coursework.grading import _fingerprint, grade
+from kfsheet.coursework.grading import STATUSES, Handed, _fingerprint, _result, grade
 from kfsheet.coursework.handout import handout_bytes, own_run
-from kfsheet.coursework.judge import Mark
+from kfsheet.coursework.judge import CREDIT, Mark
 from kfsheet.coursework.marking import _with_words
 from kfsheet.coursework.questions import FIRST, LOOKS_RIGHT, NOT_YET
 from kfsheet.coursework.roster import Student, harmless, read_roster
@@ -82,6 +85,55 @@ def test_exports_hold_no_formula():
     for text in ("=1", "+1", "-1", "@x", "\t=1"):
         assert not harmless(text).startswith(("=", "+", "-", "@", "\t"))
     assert harmless("Ada") == "Ada"
+
+
+@pytest.fixture
+def small(tmp_path):
+    """A course of one student, and the call that hands out."""
+    (tmp_path / "roster.csv").write_text("id,name\nq7,Ada\n")
+    ask = ("handout", "football", "--roster", tmp_path / "roster.csv", "--out", tmp_path / "out")
+    return tmp_path, ask
+
+
+def test_the_first_handout_says_where_the_secret_is(small, capsys):
+    home, ask = small
+    assert call(*ask) == 0
+    words = f"made the secret of the course: {home / 'kfsheet.secret'}; keep it, and to yourself"
+    assert words in capsys.readouterr().out
+    assert call(*ask) == 0, "the same bytes again"
+    assert "made the secret" not in capsys.readouterr().out
+
+
+def test_a_lost_or_another_secret_does_not_replace_what_was_handed_out(small, capsys):
+    home, ask = small
+    assert call(*ask) == 0
+    path = home / "out/students/q7/football.xlsx"
+    before, secret = path.read_bytes(), (home / "kfsheet.secret").read_text()
+    assert secret.strip() not in (home / "out/kfsheet.json").read_text()
+    (home / "kfsheet.secret").unlink()
+    assert call(*ask, "--force") == 2
+    assert "--secret" in capsys.readouterr().err
+    assert not (home / "kfsheet.secret").exists()
+    read_secret(home / "other", make=True)
+    assert call(*ask, "--secret", home / "other", "--force") == 2
+    assert "another secret" in capsys.readouterr().err
+    assert path.read_bytes() == before
+    (home / "kfsheet.secret").write_text(secret)
+    assert call(*ask) == 0
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_handout_that_would_change_is_replaced_by_force_only(small, jobs, capsys):
+    home, ask = small
+    assert call(*ask) == 0
+    path = home / "out/students/q7/football.xlsx"
+    before = path.read_bytes()
+    (home / "roster.csv").write_text("id,name\nq7,Ada Lovelace\n")
+    assert call(*ask, "--jobs", jobs) == 2
+    assert "--force" in capsys.readouterr().err
+    assert path.read_bytes() == before
+    assert call(*ask, "--jobs", jobs, "--force") == 0
+    assert path.read_bytes() != before
 
 
 # -- handouts ------------------------------------------------------------------------------------
@@ -184,6 +236,29 @@ def test_feedback_is_live_and_gives_no_number_away(handout, engine, tmp_path):
     assert words() == [LOOKS_RIGHT] * len(names)
     paper.answer("K_x", do.negated)
     assert words()[0] == NOT_YET
+
+
+def test_the_sheet_of_questions_says_what_a_check_number_is(handout):
+    sheet = openpyxl.load_workbook(handout)["Questions"]
+    words = " ".join(str(c.value) for row in sheet.iter_rows(max_row=FIRST - 1) for c in row)
+    assert "A typed number may look right here and earns nothing." in words
+    assert "still shows 'not yet' while an answer it depends on is wrong" in words
+    heads = [cell.value for cell in sheet[FIRST - 1]]
+    assert heads[5:7] == ["check number: yours", "check number: wanted"]
+    read_me = openpyxl.load_workbook(handout)["Read me"]
+    assert "notebook" not in [cell.value for cell in read_me["A"]], "it holds the formulas"
+
+
+def test_points_stand_on_the_sheet_of_questions_only(handout):
+    book = openpyxl.load_workbook(handout)
+    told = {s.title for s in book for row in s.values for v in row if "points" in str(v).split()}
+    assert told == {"Questions"}
+    assert book["Reanalysis"]["G3"].value == FOOTBALL.model.column("x_f").description
+
+
+def test_check_says_what_a_handout_is_for(handout, capsys):
+    assert call("check", handout) == 2
+    assert "is a student's handout; use: kfsheet grade" in capsys.readouterr().err
 
 
 def test_a_solution_is_a_sound_workbook(tmp_path):
@@ -317,7 +392,37 @@ def test_everybody_on_the_roster_has_a_row_with_score_and_status(graded):
         "s007": ("0", "no submission"),
     }
     assert (rows["s003"]["K_x"], rows["s003"]["u"], rows["s003"]["w"]) == ("0", "0", "2")
-    assert "2 files came back; the newest counts" in rows["s003"]["remark"]
+    assert rows["s003"]["remark"] == (
+        "2 files came back; the newest with answers counts (capekzoe_1_3_new.xlsx), "
+        "not (capekzoe_1_2_old.xlsx: untouched)"
+    )
+
+
+def marks_of(name, points):
+    return [Mark(name, 9, points, "right", "")]
+
+
+@pytest.mark.parametrize(
+    ("later", "score", "words"),
+    [
+        (Assessment("untouched", "", "s001", marks_of("u", 0.0)), 7, "(1.xlsx: untouched)"),
+        (Assessment("damaged", "cannot be opened"), 7, "(1.xlsx: damaged)"),
+        (Assessment("timed out", "too long"), 7, "(1.xlsx: timed out)"),
+        (Assessment("graded", "", "s002", marks_of("u", 9.0)), 7, "somebody else's file"),
+        (Assessment("graded", "", "s001", marks_of("u", 3.0)), 3, "with different scores"),
+    ],
+)
+def test_a_later_file_without_answers_takes_no_marks_away(tmp_path, later, score, words):
+    ada, earlier = STUDENTS[0], Assessment("graded", "", "s001", marks_of("u", 7.0))
+    handed = []
+    for n, found in enumerate((earlier, later)):
+        (tmp_path / f"{n}.xlsx").touch()
+        os.utime(tmp_path / f"{n}.xlsx", (1e9 + n, 1e9 + n))
+        handed.append(Handed(tmp_path / f"{n}.xlsx", ada, str(n), found))
+    result = _result(ada, handed, 9)
+    assert (result.status, result.score) == ("graded", score)
+    assert words in result.remark
+    assert "2 files came back" in result.remark
 
 
 def test_every_process_writes_the_same_workbook(course):
@@ -355,6 +460,12 @@ def test_every_student_gets_the_own_workbook_with_marks_beside_the_answers(grade
     assert book["Reanalysis"]["G3"].fill.start_color.rgb == "FFC6EFCE"
     assert book["Parameters"]["D23"].value == "2/2: right."
     assert book["Charts"]._charts
+    heights = book["Marks"].row_dimensions
+    remarks = {row: len(book["Marks"].cell(row, 5).value or "") for row in range(2, 12)}
+    assert all(heights[row].height >= 15 * length / 90 for row, length in remarks.items())
+    page = book["Marks"].page_setup
+    assert (page.orientation, page.fitToHeight) == ("landscape", 0)
+    assert book["Marks"].sheet_properties.pageSetUpPr.fitToPage
     values = recalculate(marked, engine)
     scores = [values["Marks"][row, 3] for row in range(2, 13)]
     assert values["Marks"][12, 1] == "total"
@@ -393,6 +504,7 @@ def test_a_second_run_goes_on_and_keeps_what_a_lecturer_changed(course, graded):
     assert time.monotonic() - start < 30
     rows = {row["id"]: row for row in table(graded / "grades.csv")}
     assert (rows["s002"]["score"], rows["s002"]["u"]) == ("17.5", "1.5")
+    assert rows["s002"]["remark"] == "u: half seen"
     assert (rows["s007"]["score"], rows["s007"]["remark"]) == ("9", "oral")
     assert (graded / "overrides.csv").read_bytes() == before
     again = {p.name: p.stat().st_mtime_ns for p in (graded / "work").glob("*.json")}
@@ -453,12 +565,48 @@ def test_a_corrected_exercise_leaves_no_old_marks(course, tmp_path):
     assert len({_fingerprint(FOOTBALL), _fingerprint(fewer)}) == 2
 
 
+def test_files_of_nobody_and_files_passed_over_are_told(course, tmp_path, capsys):
+    """A zip of the whole class, a page and notes of the platform, a link."""
+    _, ask, sub = course
+    (tmp_path / "in" / "a").mkdir(parents=True)
+    with zipfile.ZipFile(tmp_path / "in" / "class.zip", "w") as archive:
+        archive.write(sub / "x" / "football (2).xlsx", "s002/football.xlsx")
+    for name in ("notes.txt", "a/page.html", ".DS_Store"):
+        (tmp_path / "in" / name).write_text("x")
+    (tmp_path / "in" / "link.xlsx").symlink_to(sub / "x" / "football (2).xlsx")
+    assert call("grade", "football", tmp_path / "in", *ask, "--out", tmp_path / "in/g") == 0
+    out = capsys.readouterr().out
+    assert "files that belong to nobody: 1" in out
+    assert "files passed over: 4 (.DS_Store, " in out
+    page = (tmp_path / "in/g/class.html").read_text().partition("Files that belong to nobody")[2]
+    for words in ("class.zip", "wrong kind", "unpack it first", "named by its student"):
+        assert words in page
+
+
 def test_a_secret_that_fits_no_file_is_told(course, tmp_path, capsys):
     home, _, sub = course
     (tmp_path / "other").write_bytes(b"another secret of 32 bytes......")
     ask = ("--roster", home / "roster.csv", "--secret", tmp_path / "other")
     assert call("grade", "football", sub, *ask, "--out", tmp_path / "g") == 1
     assert "is --secret the right file?" in capsys.readouterr().err
+
+
+def test_readme_has_a_row_for_every_status():
+    readme = (Path(__file__).parents[1] / "README.md").read_text()
+    for status in (*STATUSES, *CREDIT):
+        assert f"| {status} |" in readme, status
+
+
+def test_two_exercises_do_not_share_a_folder_of_results(course, tmp_path, capsys):
+    _, ask, _ = course
+    (tmp_path / "in").mkdir()
+    out = ("--out", tmp_path / "g")
+    assert call("grade", "football", tmp_path / "in", *ask, *out) == 0
+    before = {p.name: p.read_bytes() for p in (tmp_path / "g").iterdir() if p.is_file()}
+    assert call("grade", "cannonball", tmp_path / "in", *ask, *out) == 2
+    assert "holds the results of football" in capsys.readouterr().err
+    assert {p.name: p.read_bytes() for p in (tmp_path / "g").iterdir() if p.is_file()} == before
+    assert call("grade", "football", tmp_path / "in", *ask, *out) == 0
 
 
 def test_reports_inside_the_folder_of_submissions_are_no_submissions(course, tmp_path):

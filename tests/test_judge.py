@@ -130,7 +130,7 @@ def test_an_untouched_handout_scores_nothing_and_is_called_so(name, handouts, tm
     (tmp_path / "a.xlsx").write_bytes(handouts(name))
     found = assess(paper.exercise.name, SECRET, tmp_path / "a.xlsx")
     assert found.status == "untouched"
-    assert {(m.score, m.status) for m in found.marks} == {(0.0, "empty")}
+    assert {(m.score, m.status, m.remark) for m in found.marks} == {(0.0, "empty", "")}
 
 
 @pytest.mark.parametrize("name", exercise_names())
@@ -231,7 +231,11 @@ def test_a_formula_split_over_several_helper_columns_and_names_is_right(football
         ("x_f", "=G{r}", "wrong", "own cell"),
         ("x_f", "=K{r}-IF(ISNUMBER(I{r}),K_x*I{r},0)", "wrong", "circle"),
         ("d_i", "=C{r}-a*G{r}", "gaps forgotten", "missing"),
-        ("x_f", "=K{p}+1.001*E{r}*dt-h*f*SIGN(E{r})*E{r}^2*dt^p", "rounded", "rounded"),
+        ("x_f", "=K{p}+1.001*E{r}*dt-h*f*SIGN(E{r})*E{r}^2*dt^p", "nearly right", "within 0.3 %"),
+        ("x_f", "=ROUND(K{p}+E{r}*dt-h*f*SIGN(E{r})*E{r}^2*dt^p,2)", "nearly right", "within"),
+        ("K_z", "=-2*a*b_z/(r_j+a^2*b_z)", "wrong", "factor 2 or 1/2"),
+        ("K_z", "=-a*b_z/(r_j+a^2*b_z)/2", "wrong", "factor 2 or 1/2"),
+        ("x_f", "=K{p}+2*E{r}*dt-h*f*SIGN(E{r})*E{r}^2*dt^p", "wrong", "factor 2 or 1/2"),
         ("x_a", "=G{r}+K_x*I{r}", "gaps forgotten", "missing"),
         ("x_a", "=IF(ISNUMBER(I{r}),G{r}+K_z*I{r},G{r})", "wrong", "same unit"),
         ("x_a", "=IF(ISNUMBER(I{r}),G{r}-K_x*I{r},G{r})", "wrong", "sign"),
@@ -259,6 +263,35 @@ def test_a_mistake_is_named_and_the_key_is_not(football, name, formula, status, 
     assert mark.score < mark.points
     key = football.cells(name)[-1][1][1:]
     assert key not in mark.remark
+
+
+@pytest.mark.parametrize(
+    ("name", "pattern", "number", "value"),
+    [("w", r"\bg\b", "9.81", "9.80665"), ("z_f", r"\bg\b", "9.8", "9.80665")],
+)
+def test_a_rounded_number_in_the_place_of_a_parameter_is_named(
+    football, name, pattern, number, value
+):
+    football.answer_all()
+    football.answer(name, lambda text, _: re.sub(pattern, number, text))
+    mark = one(football, name)
+    assert (mark.status, mark.score) == ("hard-coded", mark.points / 2)
+    assert f"{number} stands in the place of g, which is {value}" in mark.remark
+
+
+def test_a_number_far_from_a_parameter_does_not_stand_for_it(football):
+    football.answer_all()
+    football.answer("w", lambda text, _: re.sub(r"\bg\b", "9.5", text))
+    assert one(football, "w").score == 0
+
+
+def test_half_of_a_rounded_number_is_found_too(short, tmp_path):
+    """-g*dt^2/2, typed as -4.905*dt^2."""
+    paper = Paper(load_exercise(short)).open(tmp_path / "a.xlsx").answer_all()
+    paper.answer("y_f", lambda text, _: re.sub(r"\bg\b", "9.81", text))
+    found = {m.name: m for m in assess(short, SECRET, paper.save()).marks}
+    assert found["y_f"].status == "hard-coded"
+    assert "9.81 stands in the place of g, which is 9.80665" in found["y_f"].remark
 
 
 def test_a_swapped_atan2_is_named(short, tmp_path):

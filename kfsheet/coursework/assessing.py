@@ -14,12 +14,12 @@ from kfsheet.coursework.handout import TOKEN_PROPERTY
 from kfsheet.coursework.judge import Judge, Mark
 from kfsheet.coursework.marking import mark_workbook
 from kfsheet.coursework.places import named_cell
-from kfsheet.coursework.questions import TOKEN_NAME
 from kfsheet.coursework.recalculating import Recalculation
 from kfsheet.coursework.submission import Book, read_submission
 from kfsheet.coursework.variation import own_numbers
 from kfsheet.coursework.worlds import Scene
 from kfsheet.errors import KfsheetError, SubmissionError
+from kfsheet.excel.layout import TOKEN_NAME
 from kfsheet.exercise import Exercise
 from kfsheet.exercises import load_exercise
 from kfsheet.files import write_file
@@ -40,6 +40,11 @@ class Assessment:
 
     final: bool = True
     """Whether it would be the same on a machine that has more time."""
+
+    @property
+    def score(self) -> float:
+        """Points of all answers."""
+        return sum(mark.score for mark in self.marks)
 
     def as_dict(self) -> dict[str, Any]:
         """For a file of results."""

@@ -22,21 +22,36 @@ def submitted_files(folder: str | Path, without: Path | None = None) -> list[Pat
     DataError
         If there is no such folder.
     """
-    folder = Path(folder)
-    if not folder.is_dir():
+    return sorted(path for path, taken in _walk(_folder(folder), without) if taken)
+
+
+def passed_over(folder: str | Path, without: Path | None = None) -> list[Path]:
+    """What lies there and is no submission: notes, links, hidden files, a system's own files.
+
+    Raises
+    ------
+    DataError
+        If there is no such folder.
+    """
+    return sorted(path for path, taken in _walk(_folder(folder), without) if not taken)
+
+
+def _folder(folder: str | Path) -> Path:
+    if not Path(folder).is_dir():
         raise DataError(f"{folder} is no folder; give the folder that holds the submissions")
+    return Path(folder)
+
+
+def _walk(folder: Path, without: Path | None) -> Iterator[tuple[Path, bool]]:
     ours = without and without.resolve()
-    return sorted(p for p in _walk(folder) if ours not in p.resolve().parents)
-
-
-def _walk(folder: Path) -> Iterator[Path]:
     for path in folder.iterdir():
-        if path.name.startswith((".", "~$")) or path.name in IGNORED or path.is_symlink():
-            continue
-        if path.is_dir():
-            yield from _walk(path)
-        elif path.is_file() and path.suffix.lower() not in NOTES:
-            yield path
+        hidden = path.name.startswith((".", "~$")) or path.name in IGNORED
+        if hidden or path.is_symlink():
+            yield path, False
+        elif path.is_dir() and path.resolve() != ours:
+            yield from _walk(path, without)
+        elif path.is_file():
+            yield path, path.suffix.lower() not in NOTES
 
 
 def owner(

@@ -15,7 +15,7 @@ from kfsheet.coursework.worlds import DEPTHS, NOBODY, Own, Scene, World
 TOLERANCE = 1e-12
 TINY = 1e-20
 ROUGH = 3e-3
-"""How far a formula with a rounded constant may be off and still be called nearly right."""
+"""How far most values of a formula may be off for it to be called nearly right."""
 ENOUGH = 2
 """How many points must have a number for the answer to count."""
 ERROR = "error"
@@ -93,7 +93,7 @@ class Question:
         return count >= ENOUGH and numbers >= ENOUGH
 
     def nearly(self, expression: Basic) -> bool:
-        """Whether it differs by no more than a rounded constant would."""
+        """Whether it differs by little at three points of four."""
         for depth in DEPTHS:
             far = sorted(self.differences(expression, depth, gaps=False))
             if len(far) >= ENOUGH and far[3 * len(far) // 4] < ROUGH:

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Sequence
 from functools import lru_cache
 
-from sympy import Basic, Indexed, Number
+from sympy import Basic, Indexed, Number, Rational
 
 from kfsheet.checks import walk
-from kfsheet.coursework.comparing import Question, question
+from kfsheet.coursework.comparing import ROUGH, Question, question
 from kfsheet.coursework.mutations import MOST, mutations
 from kfsheet.coursework.worlds import Own, Scene
 from kfsheet.expressions import t
 from kfsheet.recurrence import Recurrence
 
 RIGHT, EMPTY, TYPED, WRONG = "right", "empty", "typed", "wrong"
-HARD_CODED, PARTLY, GAPS, ROUNDED = "hard-coded", "partly right", "gaps forgotten", "rounded"
+HARD_CODED, PARTLY, GAPS, NEARLY = "hard-coded", "partly right", "gaps forgotten", "nearly right"
 REFUSED, UNREADABLE, GONE = "refused", "unreadable", "gone"
 PLAIN_WORDS = {
     EMPTY: "empty",
@@ -24,6 +25,8 @@ PLAIN_WORDS = {
     UNREADABLE: "the formula could not be judged",
     WRONG: "the formula gives another value than the right one",
 }
+NEAR = 0.01
+"""How far a typed number may be from a parameter's own value and still stand for it."""
 
 
 @lru_cache(maxsize=200_000)
@@ -77,8 +80,11 @@ def diagnose(
         return GAPS, words, fingerprint
     if _has_a_number(asked, expression) and all(q.same(expression, own) for q in everywhere):
         return HARD_CODED, "a number from the data stands where its cell belongs", fingerprint
+    if words := _rounded(everywhere, expression, own):
+        return HARD_CODED, words, fingerprint
     if all(q.nearly(expression) for q in everywhere):
-        return ROUNDED, "nearly right: a constant in it is rounded", fingerprint
+        words = f"most values lie within {100 * ROUGH:g} % of the right ones, and are not equal"
+        return NEARLY, words, fingerprint
     return WRONG, _words_of(scene, name, step, expression, values), fingerprint
 
 
@@ -87,6 +93,22 @@ def _has_a_number(asked: Question, expression: Basic) -> bool:
     return bool(expression.atoms(Number) - asked.key.atoms(Number)) or bool(
         asked.key.free_symbols - expression.free_symbols
     )
+
+
+def _rounded(everywhere: list[Question], expression: Basic, own: Own) -> str:
+    """Words, if the formula is right where one parameter has a number near its own value."""
+    typed = {abs(float(c)) for c in expression.atoms(Rational)}
+    typed |= {2 * c for c in typed}  # half of a number is left of it where it is multiplied by 1/2
+    for name, value in own.parameters:
+        others = tuple(p for p in own.parameters if p[0] != name)
+        for number in sorted(typed):
+            near = math.copysign(number, value)
+            if near == value or not math.isclose(near, value, rel_tol=NEAR):
+                continue
+            if all(q.same(expression, Own((*others, (name, near)))) for q in everywhere):
+                words = f"{near:.10g} stands in the place of {name}, which is {value:.10g}"
+                return f"{words}: refer to its cell"
+    return ""
 
 
 def _still(asked: Question, expression: Basic, own: Own) -> list[str]:

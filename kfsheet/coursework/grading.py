@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
@@ -72,6 +73,11 @@ class Handed:
     owner: Student | None
     key: str
     assessment: Assessment
+
+    @property
+    def of_nobody(self) -> bool:
+        """Whether neither a token nor the path says whose the file is."""
+        return not self.assessment.student and self.owner is None
 
 
 def grade(
@@ -197,33 +203,46 @@ def _assessment(found: Assessment | Failed) -> Assessment:
 
 
 def _result(student: Student, handed: list[Handed], maximum: int) -> Result:
-    """The newest file with the student's token that lay in nobody else's folder, or what else."""
+    """The newest file with the student's token and answers, or else the newest; and the others."""
     own = [h for h in handed if h.assessment.student == student.id and h.owner in (None, student)]
-    if own:
-        return _of_file(student, _newest(own), maximum, len(own))
-    carried = [h for h in handed if h.owner == student]
-    if not carried:
+    files = own + [h for h in handed if h.owner == student and h not in own]
+    if not files:
         return Result(student, maximum, remark=_elsewhere(student, handed))
-    newest = _newest(carried)
-    if newest.assessment.student:
+    answered = [h for h in own if h.assessment.status == GRADED]
+    chosen = max(answered or files, key=lambda h: (h.path.stat().st_mtime, str(h.path)))
+    found, others = chosen.assessment, _others(student, chosen, files)
+    if found.student not in ("", student.id):
         words = "the file carries the token of another student; it was not graded for this one"
-        return Result(student, maximum, FOREIGN, words, path=newest.path, key=newest.key)
-    return _of_file(student, newest, maximum, len(carried))
-
-
-def _newest(files: list[Handed]) -> Handed:
-    return max(files, key=lambda h: (h.path.stat().st_mtime, str(h.path)))
-
-
-def _of_file(student: Student, file: Handed, maximum: int, count: int) -> Result:
-    found = file.assessment
-    remarks = [found.remark] if found.remark else []
-    if count > 1:
-        remarks.append(f"{count} files came back; the newest counts ({file.path.name})")
+        remark = "; ".join([words, *others])
+        return Result(student, maximum, FOREIGN, remark, path=chosen.path, key=chosen.key)
+    remark = "; ".join([found.remark, *others] if found.remark else others)
     return Result(
-        student, maximum, found.status, "; ".join(remarks), found.marks, file.path, file.key,
+        student, maximum, found.status, remark, found.marks, chosen.path, chosen.key,
         found.feedback,
     )  # fmt: skip
+
+
+def _others(student: Student, chosen: Handed, files: list[Handed]) -> list[str]:
+    """Words about a student's files that do not count: what they are, and their scores."""
+    if len(files) == 1:
+        return []
+    scores = {h.assessment.score for h in files if h.assessment.status == GRADED}
+    named = Counter(h.path.name for h in files)
+
+    def name(file: Handed) -> str:
+        return "/".join(file.path.parts[-2 if named[file.path.name] > 1 else -1 :])
+
+    def shown(file: Handed) -> str:
+        found = file.assessment
+        status = FOREIGN if found.student not in ("", student.id) else found.status
+        return f"{name(file)}: {status}" + f", {found.score:g} points" * (status == GRADED)
+
+    answers = " with answers" if chosen.assessment.status == GRADED else ""
+    others = ", ".join(f"({shown(file)})" for file in files if file is not chosen)
+    return [
+        f"{len(files)} files came back{' with different scores' if len(scores) > 1 else ''}; "
+        f"the newest{answers} counts ({name(chosen)}), not {others}"
+    ]
 
 
 def _elsewhere(student: Student, handed: list[Handed]) -> str:
@@ -241,6 +260,8 @@ def override(results: list[Result], lines: Iterator[dict[str, Any]]) -> list[Res
         if not line["question"]:
             result.override, result.remark = line["score"], remark
             continue
+        words = f"{line['question']}: {remark}"
+        result.remark = f"{result.remark}; {words}" if result.remark else words
         result.marks = [
             replace(m, score=line["score"], remark=remark) if m.name == line["question"] else m
             for m in result.marks

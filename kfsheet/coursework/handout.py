@@ -6,6 +6,7 @@ import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from openpyxl.formatting.rule import CellIsRule
 from openpyxl.packaging.custom import StringProperty
@@ -16,6 +17,7 @@ from openpyxl.worksheet.dimensions import ColumnDimension
 from openpyxl.worksheet.worksheet import Worksheet
 
 from kfsheet.coursework import tokens
+from kfsheet.coursework.belonging import belongs_to, claim
 from kfsheet.coursework.judge import asked_steps
 from kfsheet.coursework.questions import (
     FIRST,
@@ -29,7 +31,7 @@ from kfsheet.coursework.roster import Student
 from kfsheet.coursework.variation import own_numbers
 from kfsheet.coursework.workers import Failed, Pool
 from kfsheet.coursework.worlds import Own
-from kfsheet.errors import ModelError, WorkbookError
+from kfsheet.errors import DataError, ModelError, WorkbookError
 from kfsheet.excel.compose import Run
 from kfsheet.excel.engine import Values
 from kfsheet.excel.layout import FIRST_ROW, Layout
@@ -62,6 +64,7 @@ def write_handouts(
     out: str | Path,
     *,
     jobs: int = 1,
+    force: bool = False,
 ) -> Iterator[Path]:
     """Write every student's workbook and its solution.
 
@@ -77,6 +80,8 @@ def write_handouts(
         Folder; ``students/ID/EXERCISE.xlsx`` and ``solutions/ID/EXERCISE.xlsx`` are written there.
     jobs : int
         Processes.
+    force : bool
+        Also replace a handout that is there and would become another one.
 
     Yields
     ------
@@ -87,32 +92,50 @@ def write_handouts(
     ------
     ModelError
         If the exercise asks nothing.
+    DataError
+        If the handouts in the folder were made with another secret.
     WorkbookError
-        If a file cannot be written.
+        If a file cannot be written, or would replace another handout without ``force``.
     """
     if not exercise.questions:
         raise ModelError(f"{exercise.name} asks no questions; list them in Exercise(questions=...)")
+    if not claim(out, "secret", tokens.fingerprint(secret)):
+        raise DataError(
+            f"{out} holds handouts made with another secret; give that --secret, or another --out"
+        )
     if jobs == 1:
         for student in students:
-            yield _write_both(exercise, student, secret, Path(out))
+            yield _write_both(exercise, student, secret, Path(out), force)
         return
-    tasks = [(spec, student, secret, Path(out)) for student in students]
+    tasks = [(spec, student, secret, Path(out), force) for student in students]
     for (_, student, *_), written in Pool(_write_in_process, jobs).run(tasks):
         if isinstance(written, Failed):
             raise WorkbookError(f"the workbook of {student.id} was not written: {written.reason}")
         yield written
 
 
-def _write_in_process(spec: str, student: Student, secret: bytes, out: Path) -> Path:
-    return _write_both(load_exercise(spec), student, secret, out)
+def holds_handouts(out: str | Path) -> bool:
+    """Whether a folder holds handouts, or says of what secret they were made."""
+    return bool(belongs_to(out, "secret")) or any(Path(out).glob("students/*/*.xlsx"))
 
 
-def _write_both(exercise: Exercise, student: Student, secret: bytes, out: Path) -> Path:
-    own = own_numbers(exercise, secret, student.id)
-    solution = out / "solutions" / student.id / f"{exercise.name}.xlsx"
-    write_file(solution, solution_bytes(exercise, own))
+def _write_in_process(spec: str, *task: Any) -> Path:
+    return _write_both(load_exercise(spec), *task)
+
+
+def _write_both(
+    exercise: Exercise, student: Student, secret: bytes, out: Path, force: bool
+) -> Path:
     path = out / "students" / student.id / f"{exercise.name}.xlsx"
-    return write_file(path, handout_bytes(exercise, student, secret))
+    content = handout_bytes(exercise, student, secret)
+    if path.exists() and not force and path.read_bytes() != content:
+        raise WorkbookError(
+            f"{path} is there and would become another workbook; if it was not handed out yet, "
+            "replace it with: kfsheet handout --force"
+        )
+    solution = out / "solutions" / student.id / f"{exercise.name}.xlsx"
+    write_file(solution, solution_bytes(exercise, own_numbers(exercise, secret, student.id)))
+    return write_file(path, content)
 
 
 def own_run(exercise: Exercise, own: Own) -> Run:
@@ -141,20 +164,16 @@ def handout_bytes(exercise: Exercise, student: Student, secret: bytes) -> bytes:
 
 def handout_pages(exercise: Exercise, layout: Layout, now: Run) -> list[Page]:
     """The exercise's worksheets with empty answers, without "Check", which knows the answers."""
-    words = replace(exercise, about=(YOURS, exercise.about[0]))
+    words = replace(exercise, about=(YOURS, exercise.about[0]), notebook="")
     pages = [p for p in compose(words, layout, now, now) if p.title != "Check"]
     by_title = {page.title: page for page in pages}
     for question in exercise.questions:
-        words = f"{question.points} point{'s' * (question.points > 1)}: {question.hint}"
         if question.name in layout.scalars:
             sheet, row, column = layout.scalars[question.name]
             _empty(by_title[sheet], (row, column))
-            by_title[sheet].put(row, column + 2, words, "words", align="wrap")
             continue
         sheet, column = layout.home(question.name)
-        meant = exercise.model.column(question.name).description
-        by_title[sheet].put(3, column, f"{meant}. {words}", "words", align="wrap")
-        by_title[sheet].heights[3] = 110
+        by_title[sheet].heights[3] = 80  # there is the mark's place, later
         for step in asked_steps(exercise.model, question.name):
             _empty(by_title[sheet], (FIRST_ROW + step, column))
     for section in exercise.frozen:

@@ -23,11 +23,11 @@ from kfsheet.coursework.diagnosis import (
     GAPS,
     GONE,
     HARD_CODED,
+    NEARLY,
     PARTLY,
     PLAIN_WORDS,
     REFUSED,
     RIGHT,
-    ROUNDED,
     TYPED,
     UNREADABLE,
     WRONG,
@@ -49,7 +49,7 @@ from kfsheet.exercise import Question as Asked
 from kfsheet.expressions import Aggregate, Missing, lag, t
 from kfsheet.recurrence import Recurrence
 
-CREDIT = {RIGHT: 1.0, HARD_CODED: 0.5, PARTLY: 0.5, GAPS: 0.5, ROUNDED: 0.5}
+CREDIT = {RIGHT: 1.0, HARD_CODED: 0.5, PARTLY: 0.5, GAPS: 0.5, NEARLY: 0.5}
 """Share of the points by status; what is not listed gets none."""
 NUMBER = re.compile(r"(?<!\w)\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 FARTHEST = 8  # rows back; a key looks one or two rows back
@@ -196,6 +196,8 @@ class Judge:
         if right:
             words = f"right in {_rows(right)}; {self._where(rest, right)}: {words}"
             status = PARTLY if len(right) >= len(rest) else status
+        elif status == EMPTY:
+            words = ""  # the status says it
         score = asked.points * CREDIT.get(status, 0.0)
         return Mark(asked.name, asked.points, score, status, words, fingerprint)
 

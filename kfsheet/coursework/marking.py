@@ -27,6 +27,7 @@ PART, RELATION = "xl/worksheets/kfsheetMarks.xml", "rIdKfsheetMarks"
 MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
 SHEET_KIND = "http://schemas.openxmlformats.org/officeDocument/2006/relationships/worksheet"
 CONTENT = "application/vnd.openxmlformats-officedocument.spreadsheetml.worksheet+xml"
+REMARK_WIDTH = 90  # characters
 HEADS = ("answer", "points", "score", "status", "remark")
 
 
@@ -172,10 +173,14 @@ def _sheet(marks: Sequence[Mark], numbers: dict[str, int], total: float | None) 
     given = score if total is None else total
     lines.append((("total", points, given, "", ""), None))
     rows = "".join(
-        f'<row r="{row}">'
+        f'<row r="{row}" ht="{15 * (1 + len(cells[-1]) // REMARK_WIDTH)}" customHeight="1">'
         + "".join(_cell(f"{'ABCDE'[n]}{row}", content, style) for n, content in enumerate(cells))
         + "</row>"
         for row, (cells, style) in enumerate(lines, 1)
     )
-    columns = '<cols><col min="1" max="4" width="14"/><col min="5" max="5" width="90"/></cols>'
-    return f'<worksheet xmlns="{MAIN}">{columns}<sheetData>{rows}</sheetData></worksheet>'
+    columns = '<cols><col min="1" max="4" width="14"/>'
+    columns += f'<col min="5" max="5" width="{REMARK_WIDTH}"/></cols>'
+    fit = '<sheetPr><pageSetUpPr fitToPage="1"/></sheetPr>'
+    print_as = '<pageSetup paperSize="9" orientation="landscape" fitToWidth="1" fitToHeight="0"/>'
+    content = f"{fit}{columns}<sheetData>{rows}</sheetData>{print_as}"
+    return f'<worksheet xmlns="{MAIN}">{content}</worksheet>'

@@ -16,6 +16,7 @@ from kfsheet.recurrence import Recurrence
 SIGN = "a sign is wrong"
 TERM = "a term is missing"
 FACTOR = "a factor is missing"
+TWO = "a factor 2 or 1/2 is missing, or one too many"
 INVERSE = "a factor stands in the numerator instead of the denominator, or the other way round"
 EXPONENT = "an exponent or a root is wrong"
 LAG = "a reference points to the wrong row (one step too early or too late)"
@@ -29,6 +30,8 @@ MOST = 400
 def mutations(model: Recurrence, key: Expr) -> Iterator[tuple[str, Expr]]:
     """Pairs of words and mutated key, likely mistakes first."""
     yield SIGN, -key
+    yield TWO, 2 * key
+    yield TWO, key / 2
     yield from _all_lags(key)
     for path, node in _nodes(key, ()):
         for words, other in _of_node(model, node):
@@ -58,6 +61,8 @@ def _of_node(model: Recurrence, e: Basic) -> Iterator[tuple[str, Expr]]:
             rest = [*e.args[:n], *e.args[n + 1 :]]
             yield SIGN, Add(*rest, -term)
             yield TERM, Add(*rest)
+            yield TWO, Add(*rest, 2 * term)
+            yield TWO, Add(*rest, term / 2)
     elif isinstance(e, Mul):
         for n, factor in enumerate(e.args):
             rest = [*e.args[:n], *e.args[n + 1 :]]

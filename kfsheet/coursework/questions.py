@@ -17,17 +17,17 @@ from openpyxl.workbook import Workbook
 from kfsheet.coursework import tokens
 from kfsheet.errors import ModelError
 from kfsheet.excel.compose import Run
-from kfsheet.excel.layout import FIRST_ROW, Layout, quote
+from kfsheet.excel.layout import FIRST_ROW, TOKEN_NAME, Layout, quote
 from kfsheet.excel.page import Page
 from kfsheet.exercise import Exercise, Question
 
 SHEET, HIDDEN = "Questions", "kfsheet"
 FIRST, MODULUS = 7, 997
 LOOKS_RIGHT, NOT_YET = "looks right", "not yet"
-TOKEN_NAME = "kfsheet_token"
-HEADS = ("answer", "points", "where", "what to do", "filled in", "checksum", "right", "feedback")
-WIDTHS = {1: 14, 2: 8, 3: 22, 4: 70, 5: 10, 6: 12, 7: 10, 8: 14, 10: 12, 11: 12}
-CHARACTERS_A_LINE = 175  # of the columns A to H together, in a wide font
+YOURS, WANTED = "check number: yours", "check number: wanted"
+HEADS = ("answer", "points", "where", "what to do", "filled in", YOURS, WANTED, "feedback")
+WIDTHS = {1: 14, 2: 8, 3: 22, 4: 64, 5: 10, 6: 22, 7: 22, 8: 14, 10: 12, 11: 12}
+CHARACTERS_A_LINE = 185  # of the columns A to H together, in a wide font
 HOW = (
     "Fill in the orange cells on the sheets named below: a formula in each, from top to bottom. "
     "Everything that follows from them is live, charts too. Helper cells may stand anywhere beside "
@@ -36,8 +36,10 @@ HOW = (
     "others do; ISNUMBER tells whether there is one."
 )
 FEEDBACK = (
-    "An answer that is right looks not yet so as long as one that it is computed from is wrong; "
-    "each formula is graded on its own. In LibreOffice, press Ctrl+Shift+F9 once."
+    "A check number is made of all values of an answer; it sees values, not formulas, and is none "
+    "of them. A typed number may look right here and earns nothing. A right answer still shows "
+    f"'{NOT_YET}' while an answer it depends on is wrong; each formula is graded on its own. In "
+    "LibreOffice, press Ctrl+Shift+F9 once."
 )
 
 

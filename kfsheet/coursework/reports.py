@@ -28,6 +28,7 @@ COLOURS = {
     0.0: ("#C44E52", "#DD8A8C", "#A23B4A", "#8C8C8C", "#B0B0B0", "#6E6E6E", "#D0A0A0"),
 }
 """Of a status, by the share of the points that it brings: green, yellow, red and grey."""
+OF_NOBODY = "put it into a folder named by its student's id, and grade again"
 STYLE = """<style>
 body { font: 15px/1.5 sans-serif; max-width: 60em; margin: 2em auto; color: #222; }
 table { border-collapse: collapse; } td, th { border: 1px solid #bbb; padding: .3em .6em;
@@ -169,6 +170,7 @@ def _class_page(exercise: Exercise, results: list[Result], handed: list[Handed])
     body += "<h2>Most frequent mistakes</h2>" + _mistake_plot(judged)
     body += "<h2>Identical wrong answers</h2>" + _groups(judged)
     body += "<h2>Files that carry somebody else's token</h2>" + _foreign(results, handed)
+    body += "<h2>Files that belong to nobody</h2>" + _lost(handed)
     return _page(f"{exercise.title}: the class", body)
 
 
@@ -234,11 +236,17 @@ def _foreign(results: list[Result], handed: list[Handed]) -> str:
         if h.assessment.student
         and (h.assessment.student not in names or (h.owner and h.owner.id != h.assessment.student))
     ]
-    lost = [
-        ("", (h.path.name, "", "none")) for h in handed if not h.assessment.student and not h.owner
-    ]
     head = ("file", "came from", "token of")
-    return _html_table(head, [*rows, *lost]) if rows or lost else "<p>none</p>"
+    return _html_table(head, rows) if rows else "<p>none</p>"
+
+
+def _lost(handed: list[Handed]) -> str:
+    rows = [
+        ("", (h.path.name, h.assessment.status, h.assessment.remark, OF_NOBODY))
+        for h in handed
+        if h.of_nobody
+    ]
+    return _html_table(("file", "status", "reason", "what to do"), rows) if rows else "<p>none</p>"
 
 
 def _distribution(results: list[Result]) -> str:

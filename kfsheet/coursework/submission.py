@@ -144,7 +144,8 @@ def _check_parts(archive: zipfile.ZipFile) -> None:
         words = "this is an OpenDocument file; save it as .xlsx, Excel's format"
         raise SubmissionError("wrong kind", words)
     if "xl/workbook.xml" not in names:
-        raise SubmissionError("wrong kind", "the file is a zip, but no Excel workbook")
+        words = "the file is a zip, but no Excel workbook; if it holds submissions, unpack it first"
+        raise SubmissionError("wrong kind", words)
 
 
 class _Parts:

@@ -22,6 +22,9 @@ from kfsheet.recurrence import Recurrence
 EXERCISE_NAME, EXERCISE_PROPERTY = "kfsheet_exercise", "kfsheet exercise"
 """The cell and the property of the file that hold the name of the exercise."""
 
+TOKEN_NAME = "kfsheet_token"
+"""A cell of every workbook that is handed out to a student."""
+
 SYMBOL_ROW, UNIT_ROW, WORDS_ROW, FIRST_ROW = 1, 2, 3, 4
 PARAMETER_ROW = 5
 

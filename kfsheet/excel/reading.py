@@ -16,6 +16,7 @@ from kfsheet.excel.layout import (
     EXERCISE_PROPERTY,
     FIRST_ROW,
     SYMBOL_ROW,
+    TOKEN_NAME,
     Layout,
     quote,
 )
@@ -103,9 +104,11 @@ def layout_of(book: Opened, exercise: Exercise) -> Layout:
     Raises
     ------
     WorkbookError
-        If a sheet, a column or a name is gone.
+        If a sheet, a column or a name is gone, or the workbook is a student's handout.
     """
     model, path = exercise.model, book.path
+    if book.package.named(TOKEN_NAME):
+        raise WorkbookError(f"{path} is a student's handout; use: kfsheet grade")
     for sheet in ("Charts", "Check"):
         if sheet not in book.package.titles:
             raise WorkbookError(f"{path}: the sheet {sheet!r} is gone or renamed")
