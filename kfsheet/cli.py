@@ -16,6 +16,7 @@ from kfsheet.errors import DataError, KfsheetError, ModelError, WorkbookError
 if TYPE_CHECKING:
     from kfsheet.coursework.assessing import Assessment
     from kfsheet.excel.check import Report
+    from kfsheet.exercise import Exercise
 
 HOLDS, DOES_NOT_HOLD, WRONG_USE = 0, 1, 2
 MOST_LINES = 20
@@ -130,9 +131,17 @@ def run_build(arguments: argparse.Namespace) -> int:
     written = []
     for exercise in progress(exercises, "build", len(exercises), lambda e: e.name):
         written.append(write_workbook(exercise, Path(arguments.out), force=arguments.force))
+    for spec, exercise in zip(specs, exercises, strict=True):
+        if spec not in exercise_names():  # ours keep the misprints of their sources, on switches
+            _warn_of_units(exercise)
     for path in written:
         print(path)
     return HOLDS
+
+
+def _warn_of_units(exercise: Exercise) -> None:
+    for problem in exercise.model.check_units():
+        print(f"kfsheet: warning: {exercise.name}, units of {problem}", file=sys.stderr)
 
 
 def run_check(arguments: argparse.Namespace) -> int:

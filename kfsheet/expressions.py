@@ -5,6 +5,7 @@ from __future__ import annotations
 from sympy import Expr, Function, Indexed, IndexedBase, Piecewise, Symbol, true
 from sympy.core.singleton import Singleton
 from sympy.logic.boolalg import Boolean, BooleanFunction
+from sympy.printing.printer import Printer
 
 t = Symbol("t", integer=True, nonnegative=True)
 """The row index. ``x_a[t - 1]`` is the cell above ``x_a[t]``."""
@@ -71,6 +72,19 @@ class Aggregate(Function):
     def eval(cls, column: IndexedBase) -> None:
         """Stay symbolic: only a run of the recurrence, or a sheet, can say the value."""
         return None
+
+    # SymPy's printers go by the name of a class, and would take our Sum for theirs.
+
+    def _sympystr(self, printer: Printer) -> str:
+        return printer._print_Function(self)
+
+    def _pretty(self, printer: Printer) -> object:
+        return printer._print_Function(self)
+
+    def _latex(self, printer: Printer, exp: str = "") -> str:
+        power = f"^{{{exp}}}" if exp else ""
+        columns = ",".join(map(printer._print, self.args))
+        return rf"\operatorname{{{type(self).__name__}}}{power}{{\left({columns} \right)}}"
 
 
 class Mean(Aggregate):

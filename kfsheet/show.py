@@ -7,11 +7,12 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from openpyxl.utils import get_column_letter
+from sympy import Integer
 
 from kfsheet.errors import ModelError
 from kfsheet.evaluation import evaluate
 from kfsheet.excel.layout import FIRST_ROW, Layout
-from kfsheet.expressions import Missing
+from kfsheet.expressions import Missing, t
 from kfsheet.latex import latex_code, latex_name
 from kfsheet.parts import Column
 from kfsheet.recurrence import Recurrence
@@ -47,15 +48,26 @@ def _broken(line: str) -> list[str]:
 
 def as_latex(model: Recurrence) -> str:
     """Every definition as a line of an ``align*`` environment."""
+    apart = _like_a_row(model)
     lines = [
-        rf"  {latex_name(s.name)} &= {latex_code(s.expression)} \\"
+        rf"  {latex_code(s.symbol, apart)} &= {latex_code(s.expression, apart)} \\"
         for s in (*model.derived_scalars.values(), *model.summaries.values())
     ]
     for column in model.all_columns():
         for row, rule in enumerate(column.rules):
-            index = str(row) if row < len(column.start) else "t"
-            lines.append(rf"  {latex_name(column.name, index)} &= {latex_code(rule)} \\")
+            starts = row < len(column.start)
+            index = str(row) if starts else "t"
+            formula = latex_code(rule.xreplace({t: Integer(row)}) if starts else rule, apart)
+            lines.append(rf"  {latex_name(column.name, index)} &= {formula} \\")
     return "\n".join([r"\begin{align*}", *lines, r"\end{align*}"])
+
+
+def _like_a_row(model: Recurrence) -> set[str]:
+    """Scalars that would look like a row of a column, as u_0 where there is a column u."""
+    names = {*model.parameters, *model.derived_scalars, *model.summaries}
+    columns = {column.name for column in model.all_columns()}
+    parts = ((name, *name.rpartition("_")) for name in names)
+    return {name for name, head, _, tail in parts if head in columns and tail.isdigit()}
 
 
 def as_excel(model: Recurrence) -> str:

@@ -6,25 +6,49 @@ import openpyxl
 import pytest
 
 from kfsheet import DataError, EngineError, WorkbookError, check_workbook, recalculate
+from kfsheet.coursework.handout import solution_bytes
+from kfsheet.coursework.variation import own_numbers
+from kfsheet.excel.checkpage import TABLE_ROW
 from kfsheet.excel.reading import Opened
 from kfsheet.excel.recalculate import open_workbook
+from kfsheet.exercises import exercise_names, load_exercise
 from kfsheet.exercises.football import exercise
 
 
-@pytest.fixture
-def damaged(football_file, tmp_path):
+def changing(original, path):
     """Write a copy in which cells have been changed: ``damaged({"Reanalysis!G9": "=K8"})``."""
 
     def make(changes):
-        book = openpyxl.load_workbook(football_file)
+        book = openpyxl.load_workbook(original)
         for place, content in changes.items():
             sheet, cell = place.split("!")
             book[sheet][cell] = content(book[sheet][cell].value) if callable(content) else content
-        path = tmp_path / "damaged.xlsx"
         book.save(path)
         return path
 
     return make
+
+
+@pytest.fixture
+def damaged(football_file, tmp_path):
+    return changing(football_file, tmp_path / "damaged.xlsx")
+
+
+def write_solution(exercise, path):
+    """The workbook of a student's own numbers, with the answers."""
+    own = own_numbers(exercise, b"the secret of the tests, 32 byte", "s001")
+    path.write_bytes(solution_bytes(exercise, own))
+    return path
+
+
+@pytest.fixture(scope="module")
+def solution_file(tmp_path_factory):
+    return write_solution(exercise, tmp_path_factory.mktemp("solved") / "football.xlsx")
+
+
+@pytest.fixture
+def damaged_solution(solution_file, tmp_path):
+    return changing(solution_file, tmp_path / "damaged.xlsx")
 
 
 def places(report):
@@ -44,6 +68,44 @@ def test_changed_parameters_and_photos_are_told_and_still_hold(engine, damaged):
     report = check_workbook(path, exercise, engine)
     assert report.holds
     assert report.changed == ["r_i 9 -> 900", "h 0.5 -> 0", "1 value of i"]
+
+
+@pytest.mark.parametrize("name", exercise_names())
+def test_a_students_solution_holds_and_nothing_in_it_was_changed(name, tmp_path):
+    """It was built from the student's numbers, and its sheet "Check" knows those."""
+    own = load_exercise(name)
+    report = check_workbook(write_solution(own, tmp_path / "solution.xlsx"), own)
+    assert report.lines() == []
+    assert report.changed == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"Parameters!B12": 900}, [r"r_i [\d.]+ -> 900"]),
+        ({"Reanalysis!C9": 300}, ["values of i"]),
+        ({"Parameters!B12": 900, "Reanalysis!C9": 300}, ["values of i", r"r_i [\d.]+ -> 900"]),
+    ],
+)
+def test_what_was_changed_in_a_solution_is_told_and_it_still_holds(
+    engine, damaged_solution, changes, words
+):
+    report = check_workbook(damaged_solution(changes), exercise, engine)
+    assert report.lines() == []
+    assert len(report.changed) == len(words)
+    assert all(map(re.fullmatch, words, report.changed))
+
+
+@pytest.mark.parametrize("kind", ["parameter", "data", "result"])
+@pytest.mark.parametrize("where", ["damaged", "damaged_solution"])
+def test_a_changed_frozen_figure_is_found(request, football_file, where, kind):
+    sheet = openpyxl.load_workbook(football_file)["Check"]
+    kinds = [sheet.cell(row, 2).value for row in range(1, sheet.max_row + 1)]
+    row = kinds.index(kind, TABLE_ROW) + 1
+    change = request.getfixturevalue(where)
+    report = check_workbook(change({f"Check!E{row}": lambda frozen: frozen + 1}), exercise)
+    assert f"Check!G{row}" in places(report)
+    assert {p.address[0] for p in report.problems} == {"Check"}
 
 
 def test_answers_still_to_be_filled_in_are_named_in_order_and_nothing_else(engine, damaged):

@@ -180,6 +180,19 @@ def test_the_stone_falls_towards_its_exact_solution():
     assert model.check_units() == []
 
 
+def test_build_warns_of_units_that_do_not_agree_in_a_users_own_file(run, tmp_path):
+    """The workbook is written all the same; a sound file, and ours, build without a word."""
+    path = tmp_path / "stone.py"
+    text = Path(STONE).read_text()
+    path.write_text(text.replace("z_a[t - 1] + v[t] * dt", "z_a[t - 1] + v[t] + dt"))
+    status, out, err = run("build", path, "--out", tmp_path)
+    assert (status, out.strip()) == (0, str(tmp_path / "stone.xlsx"))
+    (warning,) = (line for line in err.splitlines() if "warning" in line)
+    assert warning == "kfsheet: warning: stone, units of z_f: dt is in s but v[t] is in m/s"
+    for sound in (STONE, "football"):
+        assert "warning" not in run("build", sound, "--out", tmp_path, "--force")[2]
+
+
 def test_check_asks_for_the_file_of_an_exercise_it_does_not_know(run, tmp_path):
     run("build", STONE, "--out", tmp_path)
     status, _, err = run("check", tmp_path / "stone.xlsx")

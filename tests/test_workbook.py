@@ -7,7 +7,8 @@ import openpyxl
 import pandas as pd
 import pytest
 from openpyxl.formula import Tokenizer
-from openpyxl.utils import FORMULAE
+from openpyxl.utils import FORMULAE, column_index_from_string
+from openpyxl.utils.cell import coordinate_from_string
 
 from kfsheet import (
     Exercise,
@@ -23,7 +24,7 @@ from kfsheet.excel.compose import Run
 from kfsheet.excel.layout import FIRST_ROW, Layout
 from kfsheet.excel.page import is_formula
 from kfsheet.excel.recalculate import convert, open_in, recalculate
-from kfsheet.excel.workbook import compose, workbook_bytes
+from kfsheet.excel.workbook import assemble, compose, workbook_bytes
 from kfsheet.exercises import load_exercise
 from kfsheet.exercises.football import exercise, football
 
@@ -85,6 +86,34 @@ def test_headers_are_symbol_unit_and_words_and_are_frozen(book):
         assert all(cell.value for cell in sheet[3])
         assert sheet.freeze_panes == "C4"
         assert [sheet.cell(FIRST_ROW + n, 1).value for n in range(16)] == list(range(16))
+
+
+def test_a_printed_page_says_where_it_comes_from(book):
+    """Name and number of the page, and the heading of its table; on A4."""
+    for sheet in book:
+        assert (sheet.oddFooter.left.text, sheet.oddFooter.right.text) == ("&A", "&P / &N")
+        assert sheet.page_setup.paperSize == int(sheet.PAPERSIZE_A4)
+        if sheet.freeze_panes:
+            heading = int(sheet.print_title_rows.replace("$", "").split(":")[1])
+            assert f"A{heading + 1}" == "A" + re.sub(r"[A-Z]+", "", sheet.freeze_panes)
+    assert book["Check"].print_title_rows == "$11:$11"
+    assert book["Check"]["A11"].value == "name"
+
+
+@pytest.mark.parametrize("name", ["cannonball", "shuttlecock", "tennis"])
+def test_a_wide_table_prints_on_pages_that_can_be_read(name):
+    """Type of 11 points gets smaller as more columns share a page, but not than 7.5 points."""
+    own = load_exercise(name)
+    layout, run = Layout.standard(own.model), Run.of(own.model)
+    pages = compose(own, layout, run, run)
+    for page, sheet in zip(pages, assemble(own, layout, pages, run), strict=True):
+        if not page.freeze:
+            continue
+        columns = column_index_from_string(coordinate_from_string(page.freeze)[0])
+        kept = sum(page.widths[n] for n in range(1, columns))
+        rest = sum(page.widths.values()) - kept
+        centimetres = 0.19 * (kept + rest / (sheet.page_setup.fitToWidth or 1))
+        assert 11 * 25.9 / centimetres > 7.5, page.title  # A4 without its margins
 
 
 def test_every_computed_cell_is_a_formula(book):

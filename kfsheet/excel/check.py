@@ -18,8 +18,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from kfsheet.errors import DataError
+from kfsheet.excel.checkpage import TOLERANCE, probes
 from kfsheet.excel.compare import Comparison
 from kfsheet.excel.compose import Run
+from kfsheet.excel.frozen import built_from
 from kfsheet.excel.reading import Inputs, Opened, layout_of, place
 from kfsheet.excel.references import Address
 from kfsheet.excel.stripping import Changes
@@ -110,17 +112,19 @@ def check_workbook(path: str | Path, exercise: Exercise, engine: str = "ironcalc
 def check(book: Opened, exercise: Exercise, built: Run | None = None) -> Report:
     """Compare a workbook that is open in an engine; see :func:`check_workbook`.
 
-    ``built`` is the run of the exercise as it is, if that is known.
+    ``built`` is the run of the exercise as it is, if that is known. The file may have been built
+    from other numbers; see :mod:`kfsheet.excel.frozen`.
     """
-    built = built or Run.of(exercise.model)
+    default = built or Run.of(exercise.model)
     layout = layout_of(book, exercise)
     inputs = Inputs(book, layout)
-    changed = list(_changed(inputs, built))
+    same = not any(_changed(inputs, default, default))
+    now = default if same else Run.of(exercise.model, inputs.data, inputs.parameters)
+    origin = built_from(book, inputs, default, now)
 
     def expecting(run: Run) -> Comparison:
-        return Comparison(book, layout, exercise, run, built)
+        return Comparison(book, layout, exercise, run, origin)
 
-    now = Run.of(exercise.model, inputs.data, inputs.parameters) if changed else built
     trials = _compared(book, inputs, now, expecting)
     _, first = next(trials)
     found, differing = first.problems, set(first.differing)
@@ -132,7 +136,7 @@ def check(book: Opened, exercise: Exercise, built: Run | None = None) -> Report:
         book.engine_name,
         first.cells,
         first.largest,
-        changed,
+        list(_changed(inputs, now, origin)),
         _in_order(found, book.package.titles),
         len(differing - set(found)),
     )
@@ -148,12 +152,15 @@ def _in_order(found: dict[Address, str], sheets: list[str]) -> list[Problem]:
     return [Problem(address, found[address]) for address in sorted(found, key=key)]
 
 
-def _changed(inputs: Inputs, built: Run) -> Iterator[str]:
+def _changed(inputs: Inputs, now: Run, built: Run) -> Iterator[str]:
     """What a user has changed since the workbook was built, in words."""
+    if not built.columns:  # the data are gone; their figures are left
+        other = (p for p in probes(inputs.layout, now, built) if not p.difference <= TOLERANCE)
+        yield from dict.fromkeys(f"values of {p.name}" for p in other if p.what == "data")
     for name, value in inputs.parameters.items():
         if value != built.scalars[name]:
             yield f"{name} {built.scalars[name]:g} -> {value:g}"
-    for name, series in inputs.data.items():
+    for name, series in inputs.data.items() if built.columns else ():
         before = [None if math.isnan(value) else value for value in built.columns[name]]
         if count := sum(a != b for a, b in zip(series, before, strict=True)):
             yield f"{count} value{'s' * (count > 1)} of {name}"

@@ -63,7 +63,7 @@ def _all_probes(layout: Layout, now: Run, built: Run) -> Iterator[Probe]:
     ):
         for name in names:
             value = built.scalars[name]
-            yield Probe(name, what, "value", f"={name}", now.scalars[name], value, _scale(value))
+            yield Probe(name, what, VALUE, f"={name}", now.scalars[name], value, _scale(value))
     for column in model.table.values():
         yield from _column_probes(layout, column, now, built)
 
@@ -76,13 +76,14 @@ def _column_probes(layout: Layout, column: Column, now: Run, built: Run) -> Iter
     steps = layout.range("t", sheet)
     bottom = f"{cells.split(':')[0].rsplit('$', 1)[0]}${layout.last_row}"
     mean_row = f"SUMPRODUCT({steps},{cells})/SUM({steps})"
-    for quantity, formula, function in (
-        ("root mean square", f"=SQRT(SUMSQ({cells})/COUNT({cells}))", rms),
-        ("mean", f"=AVERAGE({cells})", mean),
-        ("mean, weighted by step", f"={mean_row}", _weighted),
-        ("last row", f"={layout.last(name, bottom)}", last),
-    ):
-        if quantity == "mean, weighted by step" and layout.model.rows == 1:
+    formulas = (
+        f"=SQRT(SUMSQ({cells})/COUNT({cells}))",
+        f"=AVERAGE({cells})",
+        f"={mean_row}",
+        f"={layout.last(name, bottom)}",
+    )
+    for (quantity, function), formula in zip(FIGURES.items(), formulas, strict=True):
+        if function is _weighted and layout.model.rows == 1:
             continue
         now_value, built_value = now.figure(function, name), built.figure(function, name)
         yield Probe(name, what, quantity, formula, now_value, built_value, scale)
@@ -92,6 +93,17 @@ def _weighted(values: list[float]) -> float:
     """Mean weighted by the step index; unlike the mean, it moves when two rows are swapped."""
     weights = range(len(values))
     return total([w * v for w, v in zip(weights, values, strict=True)]) / sum(weights)
+
+
+VALUE = "value"
+"""What the table calls the figure of a scalar."""
+FIGURES = {
+    "root mean square": rms,
+    "mean": mean,
+    "mean, weighted by step": _weighted,
+    "last row": last,
+}
+"""Figures of a column, by what the table calls them."""
 
 
 def _scale(value: float) -> float:

@@ -148,7 +148,7 @@ def _line(page: Page, row: int, column: int, item: Any, value: Piece) -> None:
     page.put(row, column - 1, item.name, "index")
     page.pieces[row, column] = value
     page.put(row, column + 1, pretty_unit(item.unit), "unit", align="center")
-    page.put(row, column + 2, item.description, "words", align="wrap")
+    page.put(row, column + 2, item.description, "meaning", align="wrap")
 
 
 def plotted(exercise: Exercise) -> list[tuple[str, str]]:
@@ -178,7 +178,7 @@ def charts_page(exercise: Exercise, layout: Layout, now: Run) -> Page:
         page.put(*chart_place(number), chart.note, "note")
     names = plotted(exercise)
     if names:
-        page.put(2, 1, "The columns from AA on are plotted where a value may be missing.")
+        page.put(2, 1, "Helper columns for the charts stand from AA on.")
     for at, (name, where) in enumerate(names, PLOTTED_COLUMN):
         column = exercise.model.column(name)
         _head(

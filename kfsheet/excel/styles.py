@@ -21,6 +21,7 @@ KINDS = {
     "header": (DARK, "FFFFFF", True, 11),
     "unit": ("D9E2F3", "404040", False, 10),
     "words": ("D9E2F3", "404040", False, 9),
+    "meaning": ("D9E2F3", "404040", False, 11),
     "parameter": ("FFF2CC", "1F3FBF", True, 11),
     "data": ("E2EFDA", "000000", False, 11),
     "formula": ("FFFFFF", "000000", False, 11),

@@ -18,7 +18,7 @@ from openpyxl.worksheet.worksheet import Worksheet
 
 from kfsheet.errors import WorkbookError
 from kfsheet.excel.cells import sheet_data
-from kfsheet.excel.checkpage import FAIL, PASS, check_page
+from kfsheet.excel.checkpage import FAIL, PASS, TABLE_ROW, check_page
 from kfsheet.excel.compose import (
     Run,
     charts_page,
@@ -35,7 +35,7 @@ from kfsheet.exercise import Exercise
 from kfsheet.files import write_file
 
 TABS = {"Read me": "1F3864", "Parameters": "FFC000", "Charts": "0072B2", "Check": "70AD47"}
-COLUMNS_IN_VIEW, COLUMNS_ON_PAPER = 20, 16  # a wider table is unreadable on one page
+COLUMNS_AT_MOST, COLUMNS_ON_PAPER = 14, 10  # a wider table is unreadable on one page
 
 
 def compose(exercise: Exercise, layout: Layout, now: Run, built: Run) -> list[Page]:
@@ -156,14 +156,17 @@ def _dress(sheet: Worksheet, page: Page) -> None:
     sheet.sheet_view.showGridLines = bool(page.freeze)
     sheet.page_setup.orientation, sheet.page_setup.fitToHeight = "landscape", 0
     sheet.sheet_properties.pageSetUpPr.fitToPage = True
+    sheet.page_setup.paperSize = sheet.PAPERSIZE_A4
+    sheet.oddFooter.left.text, sheet.oddFooter.right.text = "&A", "&P / &N"
     if page.freeze:
-        sheet.print_title_rows = f"1:{FIRST_ROW - 1}"
+        first = TABLE_ROW if page.title == "Check" else 1
+        sheet.print_title_rows = f"{first}:{coordinate_from_string(page.freeze)[1] - 1}"
         _spread(sheet, page)
 
 
 def _spread(sheet: Worksheet, page: Page) -> None:
     """A wide table on several pages side by side, each with the columns that stay in view."""
-    if page.width <= COLUMNS_IN_VIEW:
+    if page.width <= COLUMNS_AT_MOST:
         return
     sheet.page_setup.fitToWidth = ceil(page.width / COLUMNS_ON_PAPER)
     last = coordinate_from_string(page.freeze)[0]

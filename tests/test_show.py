@@ -1,0 +1,55 @@
+"""``kfsheet show``: every exercise in every dress, and what the dresses say."""
+
+import re
+
+import pytest
+import sympy as sp
+
+from kfsheet import excel_code, latex_code, load_exercise, python_code
+from kfsheet.exercises import exercise_names
+from kfsheet.expressions import Aggregate, ColumnBase
+from kfsheet.latex import latex_name, verbatim_name
+from kfsheet.show import DRESSES
+
+AGGREGATES = Aggregate.__subclasses__()
+
+
+def aggregate(kind):
+    (count,) = kind.nargs
+    return kind(*(ColumnBase(name, real=True) for name in ("x", "y")[:count]))
+
+
+@pytest.mark.parametrize("dress", DRESSES)
+@pytest.mark.parametrize("name", exercise_names())
+def test_every_exercise_can_be_shown_in_every_dress(name, dress):
+    model = load_exercise(name).model
+    text = DRESSES[dress](model)
+    for summary in model.summaries:
+        latex = {latex_name(summary), verbatim_name(summary)}
+        assert any(name in text for name in (latex if dress == "latex" else {summary}))
+
+
+@pytest.mark.parametrize("kind", AGGREGATES, ids=lambda kind: kind.__name__)
+def test_every_printer_knows_every_aggregate(kind):
+    """SymPy's printers too, which go by the name of a class and have a Sum of their own."""
+    one = aggregate(kind)
+    cells = {arg: f"$B${n}:$B${n + 8}" for n, arg in enumerate(one.args, 4)}
+    cells[one] = "$B$12"  # what Last asks for
+    for expression in (one, one**2 / 2):
+        assert kind.__name__ in str(expression)
+        assert kind.__name__ in latex_code(expression)
+        assert kind.__name__ in sp.latex(expression)
+        assert kind.__name__ in sp.pretty(expression)
+        assert "x" in python_code(expression)
+        assert "$B$" in excel_code(expression, cells.__getitem__)
+
+
+def test_latex_start_rows_speak_of_their_own_rows():
+    """Row 0 is row 0 on both sides, and a parameter is no row of a column of the same name."""
+    lines = DRESSES["latex"](load_exercise("football").model).splitlines()
+    starts = [line for line in lines if re.match(r"  \S*\d\} &= ", line)]
+    assert len(starts) > 10
+    assert [line for line in starts if re.search(r"[{,]t[-},]", line)] == []
+    sides = [line.rstrip("\\ ").split(" &= ") for line in starts]
+    assert [left.strip() for left, right in sides if left.strip() in right] == []
+    assert r"  u_{0} &= \mathtt{u\_0} \\" in lines
