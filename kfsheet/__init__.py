@@ -1,5 +1,6 @@
 """kfsheet: a Kalman filter derived once, evaluated, written as a workbook, checked and taught.
 
+``t`` is the row of a recurrence, a SymPy symbol: ``x[t - 1]`` is the cell above ``x[t]``.
 The public names are imported when they are first used, so that ``import kfsheet`` is quick.
 """
 

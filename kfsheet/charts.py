@@ -42,7 +42,17 @@ LOOKS = {
 
 @dataclass(frozen=True)
 class Series:
-    """Column ``y`` against column ``x``; a series without label stays out of the legend."""
+    """Column ``y`` against column ``x``.
+
+    Parameters
+    ----------
+    x, y : str
+        Names of columns; ``time`` is the clock.
+    label : str
+        What the legend says; a series without label, ``""``, stays out of it.
+    role : str
+        What it shows, which decides how it is drawn: one of ``LOOKS``, as ``"truth"``.
+    """
 
     x: str
     y: str
@@ -52,7 +62,25 @@ class Series:
 
 @dataclass(frozen=True)
 class Chart:
-    """One chart: axes with units, and the sentence that says what to look for."""
+    """One chart: axes with units, and the sentence that says what to look for.
+
+    Parameters
+    ----------
+    title : str
+        Above the chart.
+    x_label, y_label : str
+        Of the axes, with units, as in ``"time (s)"``.
+    series : tuple of Series
+        What is drawn, the last on top.
+    note : str
+        The sentence above it: what to look for.
+    origin_top_left : bool
+        Whether y grows downwards, as in a photo.
+    y_limits : tuple of (lowest, highest), optional
+        Range of y, where a few large values would hide the rest.
+    where : str
+        A column that is 0 in rows that are not drawn: what a ball would do underground.
+    """
 
     title: str
     x_label: str
@@ -61,9 +89,7 @@ class Chart:
     note: str = ""
     origin_top_left: bool = False
     y_limits: tuple[float, float] | None = None
-    """Lowest and highest y, where a few large values would hide the rest."""
     where: str = ""
-    """A column that is 0 in rows that are not drawn: what a ball would do underground."""
 
     def check(self, model: Recurrence) -> None:
         """Refuse a chart of columns or roles that do not exist."""

@@ -42,7 +42,7 @@ def checked_expression(name: str, expression: Any) -> Expr:
     for number in (node for node in walk(expression) if isinstance(node, Float | Rational)):
         if isinstance(number, Float) or not _small(number):
             raise ModelError(
-                f"{name} holds the number {number}; make it a parameter, "
+                f"{name} holds the number {_shown(number)}; make it a parameter, "
                 "so that it has a name, a unit and a place where it can be changed"
             )
     _check_columns(name, expression)
@@ -69,6 +69,10 @@ def _check_columns(name: str, expression: Expr) -> None:
 def _small(number: Rational) -> bool:
     small = abs(number.p) <= LARGEST_NUMBER and number.q <= LARGEST_DENOMINATOR
     return small or {abs(number.p), number.q} <= FULL_CIRCLE | {1}
+
+
+def _shown(number: Float | Rational) -> str:
+    return f"{float(number):.15g}" if isinstance(number, Float) else str(number)
 
 
 def _exact(number: Float) -> Expr:
@@ -123,7 +127,7 @@ def check_lags(name: str, expression: Expr, first_row: int, starts: int) -> None
             rule = f"start value {first_row}" if first_row < starts else "the definition"
             raise ModelError(
                 f"{name}: {rule} reads {cell}, but holds from row {first_row} on; "
-                f"give {back} start values"
+                + ("give a start value" if back == 1 else f"give {back} start values")
             )
 
 

@@ -236,3 +236,8 @@ class Study:
     members: int
     rows: dict[str, pd.DataFrame]
     scalars: pd.DataFrame
+
+    def __repr__(self) -> str:
+        columns = ", ".join(self.rows) or "none"
+        scalars = ", ".join(map(str, self.scalars.index)) or "none"
+        return f"<Study of {self.members} members: rows of {columns}; scalars {scalars}>"

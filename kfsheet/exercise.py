@@ -19,7 +19,17 @@ Draw = Callable[["RandomState", Mapping[str, float]], Mapping[str, list[float]]]
 
 @dataclass(frozen=True)
 class Question:
-    """A column or derived scalar that students fill in: its name, points and a hint."""
+    """A column or derived scalar that students fill in.
+
+    Parameters
+    ----------
+    name : str
+        Of the column or the derived scalar.
+    points : int
+        What it is worth: 1, 2, 3, ...
+    hint : str
+        A sentence that helps to begin.
+    """
 
     name: str
     points: int

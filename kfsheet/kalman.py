@@ -148,7 +148,8 @@ class StateSpace:
         if n == 0:
             raise ModelError("the state has no elements")
         if len(self.transition) != n:
-            raise ModelError(f"the state has {n} elements but the transition {self.transition}")
+            have = f"the transition has {len(self.transition)}: {self.transition}"
+            raise ModelError(f"the state has {n} elements but {have}")
         if self.Q.shape != (n, n) or not self.Q.is_symmetric():
             raise ModelError(f"Q must be symmetric and {n} x {n}; it is {self.Q}")
         names = [o.name for o in self.observations]

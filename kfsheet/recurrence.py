@@ -295,7 +295,8 @@ class Recurrence:
             return self.table[name]
         if self.clock and self.clock.name == name:
             return self.clock
-        raise ModelError(f"{self.name} has no column {name!r}; it has {', '.join(self.table)}")
+        there = ", ".join(self.table) or "none yet"
+        raise ModelError(f"{self.name} has no column {name!r}; it has {there}")
 
     def units(self) -> dict[str, str]:
         """Unit text of every name."""

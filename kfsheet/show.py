@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 WIDTH = 80
+END = 5  # rows at either end of a long table
 
 
 def as_python(model: Recurrence) -> str:
@@ -73,19 +74,19 @@ def _like_a_row(model: Recurrence) -> set[str]:
 def as_excel(model: Recurrence) -> str:
     """Every formula of the workbook, for the start rows and the first row after them."""
     layout = Layout.standard(model)
-    lines = ["Parameters"]
+    lines, width = ["Parameters"], max(map(len, model.units()))
     for name, scalar in {**model.derived_scalars, **model.summaries}.items():
         sheet, row, column = layout.scalars[name]
         formula = layout.formula(scalar.expression, sheet)(row)
-        lines.append(f"  {name:12} {get_column_letter(column)}{row:<5} {formula}")
+        lines.append(f"  {name:{width}} {get_column_letter(column) + str(row):7} {formula}")
     for section, columns in model.sections.items():
         lines += ["", section]
         for column in (*model.clock_of(section), *columns):
             letter = get_column_letter(layout.columns[section][column.name])
             rows = range(max(1, len(column.rules)))
             for row, text in zip(rows, _texts(layout, section, column, rows), strict=True):
-                name = "" if row else column.name
-                lines.append(f"  {name:12} {letter}{row + FIRST_ROW:<5} {text}")
+                name, cell = "" if row else column.name, f"{letter}{row + FIRST_ROW}"
+                lines.append(f"  {name:{width}} {cell:7} {text or '(empty)'}")
     return "\n".join(lines)
 
 
@@ -124,15 +125,19 @@ def formula_table(model: Recurrence, section: str, rows: int = 3) -> pd.DataFram
 
 
 def as_table(model: Recurrence) -> str:
-    """Scalars, then the columns section by section, in lines of 80 characters."""
+    """Scalars, then both ends of the columns section by section, in lines of 80 characters."""
     frame = evaluate(model)
     units, scalars = frame.attrs["units"], {**frame.attrs["parameters"], **frame.attrs["scalars"]}
     lines = [
         f"{name:12} {value:<14.7g} {pretty_unit(units[name])}" for name, value in scalars.items()
     ]
+    ends = frame
+    if len(frame) > 4 * END:
+        ends, n = frame.iloc[[*range(END), *range(-END, 0)]], len(frame)
+        lines.insert(0, f"rows 0 to {END - 1} and {n - END} to {n - 1} of {n}; evaluate() has all")
     for section, columns in model.sections.items():
         names = [c.name for c in (*model.clock_of(section), *columns)]
-        part = frame[names].rename(columns={n: f"{n} [{pretty_unit(units[n])}]" for n in names})
+        part = ends[names].rename(columns={n: f"{n} [{pretty_unit(units[n])}]" for n in names})
         text = part.to_string(line_width=WIDTH, float_format="%.5g", na_rep="")
         lines += ["", section, *(line.rstrip() for line in text.splitlines())]
     return "\n".join(lines)

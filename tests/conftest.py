@@ -1,6 +1,7 @@
 """Fixtures that several test files share."""
 
 import os
+import re
 import tempfile
 from pathlib import Path
 
@@ -19,6 +20,14 @@ os.environ["KFSHEET_CACHE"] = str(Path(tempfile.gettempdir()) / f"kfsheet-tests-
 # The same draws on every machine, and no clock: a slow machine is not a wrong result.
 settings.register_profile("kfsheet", deadline=None, derandomize=True)
 settings.load_profile("kfsheet")
+
+# A folder and what is in it, from the root of one machine on; not those that every system has.
+MACHINE_PATH = r"(?<![\w.~:/*)\]}>$-])/(?!(?:dev|proc|usr|bin|Applications)/)[A-Za-z]\w*/[\w.]*"
+
+
+def without_images(text):
+    """A notebook without its pictures: letters in which any word may turn up."""
+    return re.sub(r'"image/png": ".*"', "", text)
 
 
 def need(engine):

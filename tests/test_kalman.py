@@ -420,7 +420,7 @@ SEEN = Observation("x", X, X, 1, "m")
 @pytest.mark.parametrize(
     ("parts", "message"),
     [
-        ((ONE, [X, X], zeros(1, 1), [SEEN]), "the state has 1 elements"),
+        ((ONE, [X, X], zeros(1, 1), [SEEN]), "the state has 1 elements but the transition has 2: "),
         ((ONE, [X], zeros(2, 2), [SEEN]), "Q must be symmetric and 1 x 1"),
         ((ONE, [X], zeros(1, 1), []), "give one or more observations"),
         ((ONE, [X], zeros(1, 1), [SEEN, SEEN]), "of different names"),

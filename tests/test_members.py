@@ -123,6 +123,7 @@ def test_quantiles_of_scalars_are_those_of_the_members(photos):
     values = [
         evaluate(football, {"i": photos["i"][k]}).attrs["scalars"]["rms_x_a"] for k in range(MANY)
     ]
+    assert len(repr(study).splitlines()) == 1
     found = study.scalars.loc["rms_x_a", ["0.05 quantile", "0.5 quantile"]]
     np.testing.assert_allclose(found, np.quantile(values, [0.05, 0.5]), rtol=1e-12)
 

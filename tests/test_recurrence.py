@@ -53,6 +53,7 @@ def parts(m):
         (lambda dt, g, obs, v, z: v[t - 1] + obs[t], "obs.*may be missing; write when_observed"),
         (lambda dt, g, obs, v, z: v[t - 1] - Float(9.81) * dt, "make it a parameter"),
         (lambda dt, g, obs, v, z: v[t - 1] * 86_400, "make it a parameter"),
+        (lambda dt, g, obs, v, z: v[t - 1] - Float(3.7), r"holds the number -3\.7; make"),
         (lambda dt, g, obs, v, z: v[t - 1] - 44, "make it a parameter"),
         (lambda dt, g, obs, v, z: 2 * z, r"a whole column; write z\[t\]"),
         (lambda dt, g, obs, v, z: z[t] - Mean(z), r"make it a summary\(\)"),
@@ -328,3 +329,12 @@ def test_start_values_come_in_a_list(m):
 def test_an_exercise_refuses_what_its_workbook_could_not_hold(bundle, message):
     with pytest.raises(ModelError, match=message):
         Exercise(**{"model": football, "about": ("a",), "source": "s", **bundle})
+
+
+def test_messages_are_worded_for_what_there_is(m):
+    empty = Recurrence("empty", title="Nothing yet")
+    with pytest.raises(ModelError, match="'nope'; it has none yet"):
+        empty["nope"]
+    z = m.table["z"].base
+    with pytest.raises(ModelError, match="from row 0 on; give a start value"):
+        m.define(z[t], z[t - 1], "m", "height")

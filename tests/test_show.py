@@ -44,6 +44,27 @@ def test_every_printer_knows_every_aggregate(kind):
         assert "$B$" in excel_code(expression, cells.__getitem__)
 
 
+def test_the_table_shows_both_ends_of_a_long_run_in_80_columns():
+    """The cannon-ball flies for more than a thousand rows."""
+    model = load_exercise("cannonball").model
+    lines = DRESSES["table"](model).splitlines()
+    assert max(map(len, lines)) <= 80
+    assert len(lines) < 1000
+    assert f"rows 0 to 4 and {model.rows - 5} to {model.rows - 1} of {model.rows}" in lines[0]
+    first = {line.split()[0] for line in lines if line[:1].isdigit() or line[:1] == " "}
+    assert {"0", "4", str(model.rows - 5), str(model.rows - 1)} <= first
+    assert not {"5", str(model.rows - 6)} & first
+
+
+def test_every_formula_stands_in_the_same_place_of_its_line():
+    lines = DRESSES["excel"](load_exercise("tennis").model).splitlines()
+    cells = [re.match(r"  (\S*) +[A-Z]+\d+ +(=|\(data\)|\(empty\))", line) for line in lines]
+    found = [match for match in cells if match]
+    assert len({match.start(2) for match in found}) == 1
+    assert len(found) == sum(line.startswith("  ") for line in lines)
+    assert "(empty)" in {match[2] for match in found}
+
+
 def test_latex_start_rows_speak_of_their_own_rows():
     """Row 0 is row 0 on both sides, and a parameter is no row of a column of the same name."""
     lines = DRESSES["latex"](load_exercise("football").model).splitlines()
