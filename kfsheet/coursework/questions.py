@@ -140,7 +140,7 @@ def _put_question(
     page.put(row, 1, question.name, "index")
     page.put(row, 2, question.points, "index", align="center")
     page.put(row, 3, place_of(layout, question).replace("$", ""), "index")
-    page.put(row, 4, question.hint, "words", align="wrap")
+    page.put(row, 4, question.hint, "meaning", align="wrap")
     page.put(row, 7, right, "index", align="center")
     page.put(row, 10, sum(not isnan(v) for v in values), "index")
 

@@ -15,6 +15,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from kfsheet.errors import DataError
@@ -120,10 +121,13 @@ def check(book: Opened, exercise: Exercise, built: Run | None = None) -> Report:
     inputs = Inputs(book, layout)
     same = not any(_changed(inputs, default, default))
     now = default if same else Run.of(exercise.model, inputs.data, inputs.parameters)
-    origin = built_from(book, inputs, default, now)
+
+    @cache
+    def origin() -> Run:  # found when it is needed, while the engine works
+        return built_from(book, inputs, default, now)
 
     def expecting(run: Run) -> Comparison:
-        return Comparison(book, layout, exercise, run, origin)
+        return Comparison(book, layout, exercise, run, origin())
 
     trials = _compared(book, inputs, now, expecting)
     _, first = next(trials)
@@ -136,7 +140,7 @@ def check(book: Opened, exercise: Exercise, built: Run | None = None) -> Report:
         book.engine_name,
         first.cells,
         first.largest,
-        list(_changed(inputs, now, origin)),
+        list(_changed(inputs, now, origin())),
         _in_order(found, book.package.titles),
         len(differing - set(found)),
     )

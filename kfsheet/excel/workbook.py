@@ -154,7 +154,8 @@ def _dress(sheet: Worksheet, page: Page) -> None:
     sheet.freeze_panes = page.freeze or None
     sheet.sheet_properties.tabColor = TABS.get(page.title, "A6A6A6")
     sheet.sheet_view.showGridLines = bool(page.freeze)
-    sheet.page_setup.orientation, sheet.page_setup.fitToHeight = "landscape", 0
+    sheet.page_setup.orientation = "landscape"
+    sheet.page_setup.fitToHeight = 1 if page.title == "Read me" else 0  # 0: as many as it takes
     sheet.sheet_properties.pageSetUpPr.fitToPage = True
     sheet.page_setup.paperSize = sheet.PAPERSIZE_A4
     sheet.oddFooter.left.text, sheet.oddFooter.right.text = "&A", "&P / &N"
