@@ -34,7 +34,7 @@ GROUPS = {
     "Coursework": coursework.lines,
     "Starting": starting.lines,
 }
-HEAD = "| what | kfsheet | peer | peer/kfsheet | wanted, or to say |\n|---|---|---|---|---|"
+HEAD = "| what | kfsheet | peer | peer/kfsheet | target, or a note |\n|---|---|---|---|---|"
 
 
 def main() -> None:

@@ -162,8 +162,7 @@ def _check_one(path: Path, arguments: argparse.Namespace) -> int:
     asked = Apart(path) if arguments.engine == "ironcalc" else None
     if asked:
         asked.ask()  # it works while SymPy is imported
-    from kfsheet.excel.check import check
-    from kfsheet.excel.compose import Run
+    from kfsheet.excel.check import check, prepared
     from kfsheet.excel.reading import Opened
     from kfsheet.exercises import exercise_names, load_exercise
 
@@ -172,7 +171,7 @@ def _check_one(path: Path, arguments: argparse.Namespace) -> int:
     likely = given or book.exercise_hint
     # Both take time, in which the engine works.
     exercise = load_exercise(likely) if given or likely in exercise_names() else None
-    built = Run.of(exercise.model) if exercise else None
+    built = prepared(exercise) if exercise else None
     name = book.exercise_name()
     if not given and name not in exercise_names():
         raise ModelError(

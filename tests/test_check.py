@@ -88,9 +88,9 @@ def test_a_students_solution_holds_and_nothing_in_it_was_changed(name, tmp_path)
     ],
 )
 def test_what_was_changed_in_a_solution_is_told_and_it_still_holds(
-    engine, damaged_solution, changes, words
+    damaged_solution, changes, words
 ):
-    report = check_workbook(damaged_solution(changes), exercise, engine)
+    report = check_workbook(damaged_solution(changes), exercise)
     assert report.lines() == []
     assert len(report.changed) == len(words)
     assert all(map(re.fullmatch, words, report.changed))

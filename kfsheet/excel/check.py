@@ -19,7 +19,7 @@ from functools import cache
 from pathlib import Path
 
 from kfsheet.errors import DataError
-from kfsheet.excel.checkpage import TOLERANCE, probes
+from kfsheet.excel.checkpage import FIGURES, TOLERANCE, probes
 from kfsheet.excel.compare import Comparison
 from kfsheet.excel.compose import Run
 from kfsheet.excel.frozen import built_from
@@ -113,10 +113,10 @@ def check_workbook(path: str | Path, exercise: Exercise, engine: str = "ironcalc
 def check(book: Opened, exercise: Exercise, built: Run | None = None) -> Report:
     """Compare a workbook that is open in an engine; see :func:`check_workbook`.
 
-    ``built`` is the run of the exercise as it is, if that is known. The file may have been built
+    ``built`` is the run of the exercise as it is, if that is prepared. The file may have been built
     from other numbers; see :mod:`kfsheet.excel.frozen`.
     """
-    default = built or Run.of(exercise.model)
+    default = built or prepared(exercise)
     layout = layout_of(book, exercise)
     inputs = Inputs(book, layout)
     same = not any(_changed(inputs, default, default))
@@ -144,6 +144,15 @@ def check(book: Opened, exercise: Exercise, built: Run | None = None) -> Report:
         _in_order(found, book.package.titles),
         len(differing - set(found)),
     )
+
+
+def prepared(exercise: Exercise) -> Run:
+    """The run of an exercise with all its figures: what can be found before the engine answers."""
+    run = Run.of(exercise.model)
+    for name in exercise.model.table:
+        for function in FIGURES.values():
+            run.figure(function, name)
+    return run
 
 
 def _in_order(found: dict[Address, str], sheets: list[str]) -> list[Problem]:
