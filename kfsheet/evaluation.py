@@ -213,6 +213,8 @@ def without_value(
 ) -> str:
     """What is infinite, complex, or NaN though nothing was missing; '' if nothing is."""
     for name, column in _suspicious(columns):
+        if _gaps_alone(column, gaps.get(name)):
+            continue
         for row, value in enumerate(column):
             missing = value != value and name in gaps and gaps[name][row]
             if not missing and (reason := _no_number(value)):
@@ -221,6 +223,15 @@ def without_value(
         if value == value and (reason := _no_number(value)):
             return f"{name} {reason}"
     return ""
+
+
+def _gaps_alone(column: list, gaps: np.ndarray | None) -> bool:
+    """Whether a column holds finite numbers, and NaN only where a value may be missing."""
+    try:
+        numbers = np.array(column, dtype=float)
+    except (TypeError, OverflowError):  # complex numbers, endless integers
+        return False
+    return gaps is not None and bool((np.isfinite(numbers) | (np.isnan(numbers) & gaps)).all())
 
 
 def _no_number(value: complex) -> str:
