@@ -46,22 +46,25 @@ def kernel_of(
     scalars: tuple[str, ...] | None = None,
 ) -> Kernel:
     """The kernel of one version of a model that computes what is named, or everything."""
-    every = {**model.derived_scalars, **model.summaries}
-    scalars = tuple(every) if scalars is None else scalars
     columns = tuple(c.name for c in model.all_columns()) if columns is None else columns
     return KernelSource(model, columns, scalars).kernel()
 
 
 class KernelSource:
-    """Writes the kernel of a model, leaving out what nothing wanted needs."""
+    """Writes the kernel of a model, leaving out what nothing wanted needs.
+
+    All scalars are wanted where none are named.
+    """
 
     def __init__(
-        self, model: Recurrence, columns: tuple[str, ...], scalars: tuple[str, ...]
+        self, model: Recurrence, columns: tuple[str, ...], scalars: tuple[str, ...] | None
     ) -> None:
-        self.model, self.columns, self.scalars = model, columns, scalars
+        every = (*model.derived_scalars, *model.summaries)
+        self.model, self.columns = model, columns
+        self.scalars = every if scalars is None else scalars
         self.passes = model.passes()
         self.level = {c.name: n for n, p in enumerate(self.passes) for c in p.rows[-1]}
-        self.needed = needed(model, (*columns, *scalars))
+        self.needed = needed(model, (*columns, *self.scalars))
         self.stored = self._stored()
         self.now = 0
         self._once: dict[str, str] = {}
@@ -195,9 +198,7 @@ class KernelSource:
         if not general:
             return
         depth = self._depths(general)
-        for name, deepest in depth.items():
-            for back in range(1, deepest + 1):
-                yield f"        {self.before(name, back)} = nan"
+        yield from self._unknown(depth, " " * 8)
         for row, columns in enumerate(starts):
             yield f"        t = {row}"
             yield from self._one_row(columns, row, depth, " " * 8)
@@ -213,6 +214,12 @@ class KernelSource:
         seen_later = {name for expression in whole for name in carried(expression)}
         yield from self._test([c for c in general if c.name not in seen_later], loop, " " * 12)
         yield from self._test(general, loop, " " * 8)
+
+    def _unknown(self, depth: dict[str, int], indent: str) -> Iterator[str]:
+        """Before the first row nothing was handed on."""
+        for name, deepest in depth.items():
+            for back in range(1, deepest + 1):
+                yield f"{indent}{self.before(name, back)} = nan"
 
     def _test(self, columns: Sequence[Column], row: int, indent: str) -> Iterator[str]:
         """Note what is not finite in a row; NaN is fine where the rule may give no value."""

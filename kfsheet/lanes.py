@@ -33,8 +33,7 @@ def kernel_for_many(
     scalars: tuple[str, ...] | None = None,
 ) -> Kernel:
     """The kernel for members that share their parameters: side by side where that is of use."""
-    every = {**model.derived_scalars, **model.summaries}
-    source = _Lanes(model, columns, tuple(every) if scalars is None else scalars)
+    source = _Lanes(model, columns, scalars)
     kernel = source.kernel()
     return kernel if source.is_plain else kernel_of(model, version, columns, scalars)
 
@@ -47,7 +46,7 @@ class _Lanes(KernelSource):
     """
 
     def __init__(
-        self, model: Recurrence, columns: tuple[str, ...], scalars: tuple[str, ...]
+        self, model: Recurrence, columns: tuple[str, ...], scalars: tuple[str, ...] | None
     ) -> None:
         super().__init__(model, columns, scalars)
         rows = [bool(self._rows_of(step)[-1]) for step in self.passes]
@@ -118,9 +117,7 @@ class _Lanes(KernelSource):
         depth = self._depths(general)
         yield f"        for kfsheet_lane in range({WIDTH}):"
         yield f"            {self._place('bad')} = kfsheet_fixed"
-        for name, deepest in depth.items():
-            for back in range(1, deepest + 1):
-                yield f"            {self.before(name, back)} = nan"
+        yield from self._unknown(depth, " " * 12)
         for row, columns in enumerate(starts):
             yield f"        t = {row}"
             yield from self._block(columns, row, depth, " " * 8)

@@ -22,7 +22,7 @@ from defusedxml import DefusedXmlException, ElementTree
 
 from kfsheet.coursework.worksheet import LONGEST_TEXT, MOST_CELLS, Budget, Content, SheetReader
 from kfsheet.errors import SubmissionError
-from kfsheet.excel.archive import relations
+from kfsheet.excel.archive import CUSTOM, properties, relations
 from kfsheet.excel.references import Cell
 
 MEGABYTE = 2**20
@@ -194,10 +194,5 @@ def _text(item: Element) -> str:
 
 
 def _properties(parts: _Parts) -> dict[str, str]:
-    if "docProps/custom.xml" not in parts.names:
-        return {}
-    root = parts.tree("docProps/custom.xml")
-    return {
-        item.get("name", ""): "".join(item.itertext())[:LONGEST_TEXT]
-        for item in _all(root, "property")
-    }
+    found = properties(parts.tree(CUSTOM)) if CUSTOM in parts.names else {}
+    return {name: text[:LONGEST_TEXT] for name, text in found.items()}

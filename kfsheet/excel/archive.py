@@ -15,6 +15,7 @@ from defusedxml import ElementTree
 from kfsheet.errors import WorkbookError
 
 MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
+CUSTOM = "docProps/custom.xml"
 LINKS = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
 
 
@@ -41,6 +42,12 @@ def worksheet_parts(archive: zipfile.ZipFile) -> dict[str, str]:
     links = relations(ElementTree.fromstring(archive.read("xl/_rels/workbook.xml.rels")), "xl")
     sheets = ElementTree.fromstring(archive.read("xl/workbook.xml")).iter(f"{{{MAIN}}}sheet")
     return {sheet.get("name"): links[sheet.get(f"{{{LINKS}}}id")][0] for sheet in sheets}
+
+
+def properties(root: Element) -> dict[str, str]:
+    """A file's own properties by name, from docProps/custom.xml; programs keep them, unseen."""
+    found = (item for item in root.iter() if item.tag.rpartition("}")[2] == "property")
+    return {item.get("name", ""): "".join(item.itertext()) for item in found}
 
 
 def relations(root: Element, folder: str) -> dict[str, tuple[str, str]]:

@@ -14,7 +14,7 @@ from defusedxml import ElementTree
 from openpyxl.utils import column_index_from_string, coordinate_to_tuple
 from openpyxl.workbook.defined_name import DefinedName
 
-from kfsheet.excel.archive import MAIN, refusing, worksheet_parts
+from kfsheet.excel.archive import CUSTOM, MAIN, properties, refusing, worksheet_parts
 from kfsheet.excel.references import Address
 
 FORMULA_CELL = re.compile(rb'<(?:\w+:)?c\b[^>]*?\br="([A-Z]+)([1-9][0-9]*)"[^>]*>\s*<(?:\w+:)?f\b')
@@ -34,7 +34,8 @@ class Package:
         with refusing(path), zipfile.ZipFile(path) as archive:
             book = ElementTree.fromstring(archive.read("xl/workbook.xml"))
             self._sheets = {t: archive.read(part) for t, part in worksheet_parts(archive).items()}
-            self.properties = _properties(archive)
+            custom = archive.read(CUSTOM) if CUSTOM in archive.namelist() else None
+            self.properties = properties(ElementTree.fromstring(custom)) if custom else {}
         self._names = {
             name.get("name", ""): name.text or "" for name in book.iter(f"{{{MAIN}}}definedName")
         }
@@ -62,11 +63,3 @@ class Package:
             return (places[0][0], *coordinate_to_tuple(places[0][1].replace("$", "")))
         except ValueError:
             return None
-
-
-def _properties(archive: zipfile.ZipFile) -> dict[str, str]:
-    """The file's own properties, which programs keep and nobody sees, by name."""
-    if "docProps/custom.xml" not in archive.namelist():
-        return {}
-    root = ElementTree.fromstring(archive.read("docProps/custom.xml"))
-    return {item.get("name", ""): "".join(item.itertext()) for item in root}
