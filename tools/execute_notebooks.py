@@ -48,6 +48,7 @@ def executed(source: Path) -> nbformat.NotebookNode:
     client = NotebookClient(
         notebook,
         timeout=300,
+        coalesce_streams=True,  # else it is chance in how many pieces lines are stored
         resources={"metadata": {"path": str(FOLDER)}},
         extra_arguments=["--IPKernelApp.log_level=40"],  # errors only
     )
