@@ -15,7 +15,9 @@ from functools import lru_cache
 from typing import Any
 
 from sympy import (
+    Add,
     Expr,
+    Function,
     ImmutableMatrix,
     Matrix,
     Symbol,
@@ -245,7 +247,7 @@ def transition_matrix(F: Matrix, dt: Expr) -> Matrix:
     term, total = eye(F.rows), zeros(F.rows, F.rows)
     for k in range(1, F.rows + 1):
         total += term
-        term = (term * F * dt / k).applyfunc(simplify)
+        term = (term * F * dt / k).applyfunc(_simplest)
         if term.is_zero_matrix:
             return total
     raise ModelError(f"no power of F is 0, so the series does not end; F is {F}")
@@ -298,7 +300,12 @@ def _discrete_noise(F: ImmutableMatrix, Q: ImmutableMatrix, dt: Expr) -> Immutab
     """Found once for filters that share their motion."""
     tau = Symbol("tau", real=True)
     Phi = transition_matrix(F, tau)
-    return (Phi * Q * Phi.T).applyfunc(lambda e: simplify(integrate(e, (tau, 0, dt))))
+    return (Phi * Q * Phi.T).applyfunc(lambda e: _simplest(integrate(e, (tau, 0, dt))))
+
+
+def _simplest(e: Expr) -> Expr:
+    """Simplified; a product of symbols is simple, and SymPy loads its physics to find that."""
+    return simplify(e) if e.has(Add, Function) else e
 
 
 def _check_square(name: str, matrix: Matrix) -> None:

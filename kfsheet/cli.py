@@ -157,13 +157,14 @@ def run_check(arguments: argparse.Namespace) -> int:
 
 
 def _check_one(path: Path, arguments: argparse.Namespace) -> int:
-    from kfsheet.excel.engine import Apart
+    from kfsheet.excel.apart import Apart
 
     asked = Apart(path) if arguments.engine == "ironcalc" else None
     if asked:
         asked.ask()  # it works while SymPy is imported
-    from kfsheet.excel.check import check, prepared
+    from kfsheet.excel.check import check
     from kfsheet.excel.reading import Opened
+    from kfsheet.excel.trials import foreseen
     from kfsheet.exercises import exercise_names, load_exercise
 
     book = Opened(path, arguments.engine, asked)
@@ -171,7 +172,7 @@ def _check_one(path: Path, arguments: argparse.Namespace) -> int:
     likely = given or book.exercise_hint
     # Both take time, in which the engine works.
     exercise = load_exercise(likely) if given or likely in exercise_names() else None
-    built = prepared(exercise) if exercise else None
+    ahead = foreseen(book, exercise) if exercise else None
     name = book.exercise_name()
     if not given and name not in exercise_names():
         raise ModelError(
@@ -179,10 +180,10 @@ def _check_one(path: Path, arguments: argparse.Namespace) -> int:
             f"name its file: kfsheet check {path} --exercise {name}.py"
         )
     if exercise is None or (exercise.name != name and not given):
-        exercise, built = load_exercise(name), None
+        exercise, ahead = load_exercise(name), None
     if exercise.name != name:
         raise ModelError(f"{path} was built from {name!r}, not from {exercise.name!r}")
-    report = check(book, exercise, built)
+    report = check(book, exercise, ahead or foreseen(book, exercise))
     for change in report.changed:
         print(f"{path}: changed: {change}")
     lines = report.lines()

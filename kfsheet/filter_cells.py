@@ -5,14 +5,14 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Generator, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from sympy import Expr, Indexed, Matrix, S, Symbol
 
 from kfsheet.checks import ENDLESS
 from kfsheet.expressions import ColumnBase, Missing, column_references, t, when_observed
 from kfsheet.names import CHARACTER_CODE
-from kfsheet.units import parse_unit, unit_text
+from kfsheet.unittext import Unit
 
 if TYPE_CHECKING:
     from kfsheet.kalman import StateSpace
@@ -49,7 +49,7 @@ class FilterCells:
         self.m, self.model, self.suffix = m, model, suffix
         self.names = [symbol.name for symbol in model.state]
         self.elements = list(model.state.values())
-        self.units = [parse_unit(element.unit) for element in self.elements]
+        self.units = [Unit.read(element.unit) for element in self.elements]
         self.related = _related(model)
 
     @property
@@ -101,10 +101,10 @@ class FilterCells:
         return tuple(c for c in cells if self.m.column(str(c.base.label)).gap_possible(after))
 
     def column(
-        self, name: str, rule: Expr, unit: Any, words: str, start: Expr = Missing
+        self, name: str, rule: Expr, unit: Unit, words: str, start: Expr = Missing
     ) -> Definition:
         """A definition, its name with the suffix."""
-        return Definition(readable(name + self.suffix), rule, unit_text(unit), words, start)
+        return Definition(readable(name + self.suffix), rule, str(unit), words, start)
 
     def covariance(self, i: int, j: int, stage: str, rule: Expr, start: Expr) -> Definition:
         """An entry of a covariance at a stage."""
@@ -117,7 +117,7 @@ class FilterCells:
         )
 
     def derivative(
-        self, name: str, entry: Expr, cells: Sequence[Expr], unit: Any, words: str
+        self, name: str, entry: Expr, cells: Sequence[Expr], unit: Unit, words: str
     ) -> Generator[Definition, None, Expr]:
         """An entry of a Jacobian: a constant stays where it is used, others get a column."""
         if not entry.free_symbols & self.changing and not column_references(entry):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Generator, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from sympy import (
     Abs,
@@ -26,7 +26,7 @@ from sympy import (
 
 from kfsheet.expressions import Missing, Observed
 from kfsheet.filter_cells import Definition, FilterCells, when_words
-from kfsheet.units import parse_unit
+from kfsheet.unittext import Unit
 
 if TYPE_CHECKING:
     from kfsheet.kalman import Observation, StateSpace
@@ -75,7 +75,7 @@ class FilterColumns(FilterCells):
         x_a = [self.cell(f"{name}_a", back=1) for name in self.names]
         slopes: dict[Symbol, list[Expr]] = {}
         for w, item in self.model.intermediates.items():
-            unit = parse_unit(item.unit)
+            unit = Unit.read(item.unit)
             yield self.column(w.name, self.at(item.value, x_a), unit, item.description)
             slopes[w] = yield from self.slopes(f"D_{w}", w.name, item.value, unit, x_a, slopes)
         F = zeros(len(self.all), len(self.all))
@@ -96,7 +96,7 @@ class FilterColumns(FilterCells):
         name: str,
         what: str,
         value: Expr,
-        unit: Any,
+        unit: Unit,
         x_a: Sequence[Expr],
         known: dict[Symbol, list[Expr]],
     ) -> Generator[Definition, None, list[Expr]]:
@@ -138,7 +138,7 @@ class FilterColumns(FilterCells):
         self, o: Observation, k: int
     ) -> Generator[Definition, None, tuple[Matrix, Indexed]]:
         """Columns d = y - h(x_f) and H at x_f; returns H and the innovation to weigh."""
-        x_f, unit = [self.cell(f"{name}_f") for name in self.names], parse_unit(o.unit)
+        x_f, unit = [self.cell(f"{name}_f") for name in self.names], Unit.read(o.unit)
         d = o.value - self.at(o.predicted, x_f)
         d = self.guarded(wrapped(d) if o.angle else d, self.gaps(o.value))
         words = f"innovation: {o.name} observed - {o.name} of the forecast"
@@ -160,7 +160,7 @@ class FilterColumns(FilterCells):
 
     def left(self, o: Observation, h: Matrix, moved: Sequence[Expr]) -> Iterator[Definition]:
         """What the observations before have left of d, and the variance of d itself."""
-        unit, d = parse_unit(o.unit), self.cell(f"d_{o.name}")
+        unit, d = Unit.read(o.unit), self.cell(f"d_{o.name}")
         rest = d - sum(slope * move for slope, move in zip(h, moved, strict=True))
         asked = (d,) if self.gaps(o.value) else ()
         words = f"what the observations before have left of {d.base}"
@@ -179,14 +179,14 @@ class FilterColumns(FilterCells):
                 if Ph[i] != 0:
                     words = f"covariance of {name} with the {o.name} that is expected"
                     column = f"PH_{name}_{o.name}{stage}"
-                    unit = self.units[i] * parse_unit(o.unit)
+                    unit = self.units[i] * Unit.read(o.unit)
                     yield self.column(column, Ph[i], unit, words)
                     Ph[i] = self.cell(column)
         return Ph
 
     def update(self, o: Observation, k: int, h: Matrix, d: Indexed) -> Iterator[Definition]:
         """S = h P h' + r and K = P h' / S, then what they do to x and P."""
-        unit, touched = parse_unit(o.unit), self.touched(k)
+        unit, touched = Unit.read(o.unit), self.touched(k)
         Ph = yield from self.covariance_with(o, self.P, h)
         S_o = self.cell(f"S_{o.name}")
         asked = (d,) if self.gaps(o.value) else ()
@@ -256,13 +256,13 @@ class FilterColumns(FilterCells):
         missing_some = len(parts) > 1 and Or(*seen) != True  # noqa: E712 - a SymPy condition
         if missing_some and sum(len(asked) for _, _, asked in self.weighed) > MOST_ASKED:
             for n, (part, o) in enumerate(zip(parts, self.model.observations, strict=True)):
-                yield self.column(f"NIS_{o.name}", part, parse_unit(""), f"share of {o.name}")
+                yield self.column(f"NIS_{o.name}", part, Unit.read(""), f"share of {o.name}")
                 parts[n] = self.cell(f"NIS_{o.name}")
         rule = Add(*parts)
         if missing_some:
             rule = Piecewise((rule, Or(*seen)), (Missing, True))
         words = f"normalised innovation squared; expected: {len(parts)}"
-        yield self.column("NIS", rule, parse_unit(""), words)
+        yield self.column("NIS", rule, Unit.read(""), words)
 
     @staticmethod
     def gated(o: Observation, gain: Expr, d: Indexed, S_o: Indexed) -> Expr:

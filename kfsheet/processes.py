@@ -50,9 +50,14 @@ def completed(arguments: Sequence[str], seconds: float) -> subprocess.CompletedP
     try:
         out, err = process.communicate(timeout=seconds)
     except BaseException:
-        if hasattr(os, "killpg"):
-            os.killpg(process.pid, signal.SIGKILL)  # all of its session
-        process.kill()
+        kill(process)
         process.communicate()
         raise
     return subprocess.CompletedProcess(arguments, process.returncode, out, err)
+
+
+def kill(process: subprocess.Popen) -> None:
+    """Stop a process that began a session of its own, and all that it started."""
+    if hasattr(os, "killpg") and process.poll() is None:
+        os.killpg(process.pid, signal.SIGKILL)
+    process.kill()

@@ -20,7 +20,8 @@ from kfsheet.expressions import Aggregate, ColumnBase, Last, Missing, column_ref
 from kfsheet.names import excel_name_problem, name_problem, section_problem
 from kfsheet.parts import Column, Parameter, Scalar, checked_values
 from kfsheet.schedule import Pass, refuse_circle, schedule
-from kfsheet.units import UnitProblem, UnitWalker, parse_unit
+from kfsheet.units import UnitProblem, UnitWalker
+from kfsheet.unittext import Unit
 
 
 class Recurrence:
@@ -103,7 +104,7 @@ class Recurrence:
             raise ModelError(f"parameter {name}: sign is {sign!r}, not positive or nonnegative")
         self._check_scalar_name(name)
         checks.check_words(name, description)
-        parse_unit(unit)
+        Unit.read(unit)
         symbol = Symbol(name, real=True, **({sign: True} if sign else {}))
         new = Parameter(symbol, value, unit, description, sign)
         self.parameters[name] = replace(new, value=new.checked(value))
@@ -149,7 +150,7 @@ class Recurrence:
             column has another length than the table.
         """
         checks.check_words(name, description)
-        parse_unit(unit)
+        Unit.read(unit)
         numbers = checked_values(name, values, may_be_missing)
         if self._rows not in (None, len(numbers)):
             raise DataError(f"column {name} has {len(numbers)} values, the table {self._rows} rows")
@@ -202,7 +203,7 @@ class Recurrence:
         """
         column = self._definable(cell)
         checks.check_words(column.name, description)
-        parse_unit(unit)
+        Unit.read(unit)
         if not isinstance(start, Sequence) or isinstance(start, str):
             raise ModelError(f"{column.name}: start is {start!r}; give a list, as in start=[0]")
         rules = tuple(self._checked(column.name, rule) for rule in (*start, expression))
@@ -226,7 +227,7 @@ class Recurrence:
         expression = self._checked("time", expression)
         if checks.columns_read(expression):
             raise ModelError("the clock reads a column; give it as a formula of t and parameters")
-        parse_unit(unit)
+        Unit.read(unit)
         self.clock = Column(ColumnBase("time", real=True), "", unit, description, expression)
         self.version += 1
         return self.clock.base
@@ -363,7 +364,7 @@ class Recurrence:
     ) -> Symbol:
         self._check_scalar_name(name)
         checks.check_words(name, description)
-        parse_unit(unit)
+        Unit.read(unit)
         symbol = Symbol(name, real=True)
         home[name] = Scalar(symbol, expression, unit, description)
         self.version += 1

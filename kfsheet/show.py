@@ -17,7 +17,7 @@ from kfsheet.latex import latex_code, latex_name
 from kfsheet.parts import Column
 from kfsheet.recurrence import Recurrence
 from kfsheet.source import python_source
-from kfsheet.units import pretty_unit
+from kfsheet.unittext import pretty_unit
 
 if TYPE_CHECKING:
     import pandas as pd

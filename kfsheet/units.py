@@ -40,8 +40,6 @@ from kfsheet.pythoncode import python_code
 if TYPE_CHECKING:
     from pint import Quantity
 
-SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
-
 
 @cache
 def _registry():
@@ -80,15 +78,6 @@ def unit_text(quantity: Quantity) -> str:
     'm2/s'
     """
     return f"{quantity.units:~C}".replace("**", "").replace("pixel", "px").replace("*", " ")
-
-
-def pretty_unit(text: str) -> str:
-    """A unit for the eye: ``m/s2`` as m/s², no unit as an en dash.
-
-    >>> pretty_unit("m/s2")
-    'm/s²'
-    """
-    return re.sub(r"(?<=[A-Za-z])\d+", lambda m: m[0].translate(SUPERSCRIPTS), text) or "–"
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,8 @@ import pytest
 
 from kfsheet import EngineError, WorkbookError
 from kfsheet.coursework.engine import calculated
-from kfsheet.excel.engine import Apart, IronCalc
+from kfsheet.excel.apart import Apart
+from kfsheet.excel.engine import IronCalc
 from kfsheet.excel.recalculate import recalculate
 from kfsheet.processes import completed
 
@@ -26,7 +27,7 @@ def test_a_process_of_its_own_finds_what_this_one_finds_with_other_numbers_too()
     here, apart = IronCalc(FOOTBALL), Apart(FOOTBALL)
     for changes in (None, KICK, None):
         apart.ask(changes)
-        assert apart.answer() == here.values(changes)
+        assert apart.values(changes) == here.values(changes)
 
 
 def test_an_engine_that_ends_is_an_error_in_one_line():
@@ -34,15 +35,15 @@ def test_an_engine_that_ends_is_an_error_in_one_line():
     apart._process.kill()
     apart.ask()
     with pytest.raises(EngineError, match="ended while it calculated"):
-        apart.answer()
+        apart.values()
 
 
 def test_an_engine_that_takes_too_long_is_stopped(monkeypatch):
-    monkeypatch.setattr("kfsheet.excel.engine.TIMEOUT", 0.01)
+    monkeypatch.setattr("kfsheet.excel.apart.TIMEOUT", 0.01)
     apart = Apart(FOOTBALL)
     apart.ask()
     with pytest.raises(EngineError, match=r"ended while it calculated .*, after 0.01 s"):
-        apart.answer()
+        apart.values()
 
 
 def test_a_module_of_the_current_folder_does_not_pass_for_one_of_the_library(tmp_path, monkeypatch):
@@ -50,7 +51,7 @@ def test_a_module_of_the_current_folder_does_not_pass_for_one_of_the_library(tmp
     monkeypatch.chdir(tmp_path)
     apart = Apart(FOOTBALL)
     apart.ask()
-    assert apart.answer() == IronCalc(FOOTBALL).values()
+    assert apart.values() == IronCalc(FOOTBALL).values()
 
 
 def test_what_cannot_be_read_is_said_by_the_process_too(tmp_path):
@@ -59,7 +60,7 @@ def test_what_cannot_be_read_is_said_by_the_process_too(tmp_path):
     apart = Apart(path)
     apart.ask()
     with pytest.raises(WorkbookError, match="is not a workbook"):
-        apart.answer()
+        apart.values()
 
 
 def test_an_engine_that_is_no_longer_wanted_is_stopped_at_work():
@@ -79,7 +80,7 @@ def test_what_an_engine_prints_is_no_answer(tmp_path):
     assert b't="d"' in zipfile.ZipFile(tmp_path / "a.xlsx").read("xl/worksheets/sheet2.xml")
     apart, kick = Apart(tmp_path / "a.xlsx"), ("Parameters", 5, 2)
     apart.ask(KICK)
-    assert apart.answer()["Parameters"][5, 2] == 25
+    assert apart.values(KICK)["Parameters"][5, 2] == 25
     assert calculated(tmp_path / "a.xlsx", [KICK], [kick], 60) == [[25]]
 
 
@@ -95,7 +96,7 @@ def test_an_engine_that_panics_is_an_error_that_names_the_file(tmp_path):
             new.writestr(item.filename, content)
     apart = Apart(path)
     apart.ask()
-    for compute in (lambda: recalculate(path), apart.answer):
+    for compute in (lambda: recalculate(path), apart.values):
         with pytest.raises(EngineError, match=f"IronCalc cannot read {re.escape(str(path))}: .+"):
             compute()
 

@@ -17,10 +17,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import cached_property
-from itertools import repeat
 from typing import Any
 
-import numpy as np
 from sympy import Expr, Indexed, IndexedBase
 
 from kfsheet import numerics
@@ -34,9 +32,10 @@ from kfsheet.excel.compose import (
 )
 from kfsheet.excel.engine import Values
 from kfsheet.excel.layout import FIRST_ROW, Layout
-from kfsheet.excel.page import Filled, Page, Piece, is_formula
+from kfsheet.excel.page import Page, Piece, is_formula
 from kfsheet.excel.reading import Opened
 from kfsheet.excel.references import Address
+from kfsheet.excel.whole import Whole
 from kfsheet.exercise import Exercise
 from kfsheet.expressions import lag, t
 from kfsheet.pythoncode import python_code
@@ -58,6 +57,7 @@ class Comparison:
         self.pages = [*self._pages(exercise, now, built)]
         self.values: Values = {}
         self.cells, self.largest = 0, 0.0
+        self._wholes: dict[tuple[str, int], Whole | None] = {}
         self.differing: dict[Address, Piece] = {}
         self.problems: dict[Address, str] = {}
 
@@ -68,7 +68,7 @@ class Comparison:
             for (row, column), piece in page.pieces.items():
                 self._compare((page.title, row, column), piece)
             for column, filled in page.columns.items():
-                if not self._whole(page.title, column, filled):
+                if not self._whole(page, column):
                     for row in filled.rows:
                         self._compare((page.title, row, column), filled.piece(row))
         homes = self._homes() if self.differing else {}
@@ -92,27 +92,31 @@ class Comparison:
         yield charts_page(exercise, self.layout, now)
         yield check_page(self.layout, now, built)
 
-    def _whole(self, sheet: str, at: int, filled: Filled) -> bool:
+    def prepare(self) -> None:
+        """Find what is needed to compare whole columns, before the engine has answered."""
+        for page in self.pages:
+            for column in page.columns:
+                self._wanted(page, column)
+
+    def _wanted(self, page: Page, at: int) -> Whole | None:
+        """What is expected of a column; None if its formulas are not where they belong."""
+        key = page.title, at
+        if key not in self._wholes:
+            filled = page.columns[at]
+            hollow = {filled.first + n for n, rule in enumerate(filled.rules) if rule is None}
+            formulas = self.book.formulas_among(filled.rows, page.title, at)
+            there = not filled.rules or formulas == set(filled.rows) - hollow
+            self._wholes[key] = Whole(filled, at, self.tolerance) if there else None
+        return self._wholes[key]
+
+    def _whole(self, page: Page, at: int) -> bool:
         """Whether a column agrees as a whole, so that none of its cells needs words."""
-        rows, cells = filled.rows, self.values.get(sheet, {})
-        found = list(map(cells.get, zip(rows, repeat(at), strict=False)))
-        if not filled.rules:
-            return filled.kind != "index" or found == list(filled.values)
-        hollow = {filled.first + n for n, rule in enumerate(filled.rules) if rule is None}
-        formulas = self.book.formulas_among(rows, sheet, at)
-        if formulas != set(rows) - hollow or bool in set(map(type, found)):
+        wanted = self._wanted(page, at)
+        far = wanted.distance(self.values.get(page.title, {})) if wanted else None
+        if far is None:
             return False
-        numbers = _numbers(found, filled.missing)
-        if numbers is None:
-            return False
-        expected = np.array(filled.values, dtype=float)
-        size = np.fmax(np.abs(expected), filled.scale)
-        far = np.abs(numbers - expected) / np.where(size > 0, size, 1.0)
-        none = np.isnan(numbers)
-        if (none != np.isnan(expected)).any() or (far[~none] > self.tolerance).any():
-            return False
-        self.cells += len(formulas)
-        self.largest = max(self.largest, float(far[~none].max(initial=0.0)))
+        self.cells += wanted.count
+        self.largest = max(self.largest, far)
         return True
 
     def _compare(self, address: Address, piece: Piece) -> None:
@@ -243,16 +247,6 @@ class Comparison:
                 return f"{name}, {model.step_of(sheet)} {row - FIRST_ROW}: "
         names = (name for name, cell in self.layout.scalars.items() if cell == address)
         return next((f"{name}: " for name in names), "")
-
-
-def _numbers(found: list[Any], missing: str) -> np.ndarray | None:
-    """Values of a column, NaN where there is none; None if something else stands in it."""
-    if not set(map(type, found)) <= {float, int}:
-        found = [math.nan if v in (None, "", missing) else v for v in found]
-    try:
-        return np.array(found, dtype=float)
-    except ValueError:
-        return None
 
 
 def _plain(content: Any) -> str:

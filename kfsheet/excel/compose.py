@@ -30,7 +30,7 @@ from kfsheet.expressions import Missing
 from kfsheet.numerics import rms
 from kfsheet.parts import Column
 from kfsheet.recurrence import Recurrence
-from kfsheet.units import pretty_unit
+from kfsheet.unittext import pretty_unit
 
 NOT_AVAILABLE = "#N/A"
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import repeat
 
 from openpyxl.utils import get_column_letter, quote_sheetname
 from sympy import Basic, Expr, Indexed, IndexedBase, Symbol
@@ -96,20 +97,25 @@ class Layout:
     def formula(self, expression: Expr, sheet: str) -> Callable[[int], str]:
         """Formula of a row of ``sheet`` as a function of its row number, ``=`` included.
 
-        The expression is printed once; rows only fill in numbers, which keeps large sheets cheap.
+        The expression is printed once, when the first row is asked for; rows only fill in numbers,
+        which keeps large sheets cheap.
         """
-        template, deepest = self._template(expression, sheet)
-        depth = range(deepest + 1)
-        if len(template.format(*(self.last_row for _ in depth))) > HARD_LIMIT:
-            raise PrintError(f"a formula on {sheet} is longer than {HARD_LIMIT}: {template}")
-        return lambda row: template.format(*(row - back for back in depth))
+
+        def text(row: int) -> str:
+            template, deepest = self._template(expression, sheet)
+            return template.format(*(row - back for back in range(deepest + 1)))
+
+        return text
 
     def _template(self, expression: Expr, sheet: str) -> tuple[str, int]:
         """A formula with a place for every row, and how far back it looks."""
         key = (expression, sheet)
         if key not in self._templates:
             names = _Names(self, sheet)
-            self._templates[key] = "=" + excel_code(expression, names), names.depth
+            template = "=" + excel_code(expression, names)
+            if len(template.format(*repeat(self.last_row, names.depth + 1))) > HARD_LIMIT:
+                raise PrintError(f"a formula on {sheet} is longer than {HARD_LIMIT}: {template}")
+            self._templates[key] = template, names.depth
         return self._templates[key]
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import zipfile
+from collections import defaultdict
 from pathlib import Path
 
 from defusedxml import ElementTree
@@ -17,7 +18,8 @@ from openpyxl.workbook.defined_name import DefinedName
 from kfsheet.excel.archive import CUSTOM, MAIN, properties, refusing, worksheet_parts
 from kfsheet.excel.references import Address
 
-FORMULA_CELL = re.compile(rb'<(?:\w+:)?c\b[^>]*?\br="([A-Z]+)([1-9][0-9]*)"[^>]*>\s*<(?:\w+:)?f\b')
+# It begins with letters that are searched for quickly; only a cell has such an attribute.
+FORMULA_CELL = re.compile(rb'r="([A-Z]+)([1-9][0-9]*)"[^<>]*>\s*<(?:\w+:)?f\b')
 
 
 class Package:
@@ -47,10 +49,13 @@ class Package:
 
     def formulas(self, title: str) -> dict[int, set[int]]:
         """Rows of the cells of a worksheet that hold formulas, by column."""
-        by_letters: dict[bytes, set[int]] = {}
+        by_letters: defaultdict[bytes, list[bytes]] = defaultdict(list)
         for letters, row in FORMULA_CELL.findall(self._sheets[title]):
-            by_letters.setdefault(letters, set()).add(int(row))
-        return {column_index_from_string(k.decode()): rows for k, rows in by_letters.items()}
+            by_letters[letters].append(row)
+        return {
+            column_index_from_string(letters.decode()): set(map(int, rows))
+            for letters, rows in by_letters.items()
+        }
 
     def named(self, name: str) -> Address | None:
         """The one cell that a defined name stands for, if there is such a cell."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
+from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,7 @@ from openpyxl import Workbook
 from openpyxl.utils import get_column_letter
 
 from kfsheet.errors import DataError, WorkbookError
+from kfsheet.excel.compose import Run
 from kfsheet.excel.engine import CellValue, Values
 from kfsheet.excel.layout import (
     EXERCISE_NAME,
@@ -23,7 +26,9 @@ from kfsheet.excel.layout import (
 from kfsheet.excel.package import Package
 from kfsheet.excel.recalculate import Asked, ask_about, open_workbook
 from kfsheet.excel.references import Address
+from kfsheet.excel.stripping import Changes
 from kfsheet.exercise import Exercise
+from kfsheet.parts import Column
 from kfsheet.recurrence import Recurrence
 
 
@@ -43,7 +48,11 @@ class Opened:
     @cached_property
     def values(self) -> Values:
         """What the engine finds in the file as it stands."""
-        return self.engine.answer()
+        return self.engine.values()
+
+    def values_with(self, changes: Changes) -> Values:
+        """What the engine finds with numbers put in first, if there are any."""
+        return self.engine.values(changes) if changes else self.values
 
     def value(self, address: Address) -> CellValue:
         """What the engine found in a cell."""
@@ -58,7 +67,7 @@ class Opened:
         """Those of some rows of a column that hold formulas."""
         key = rows, sheet, column
         if key not in self._among:
-            self._among[key] = {row for row in self.formula_rows(sheet, column) if row in rows}
+            self._among[key] = self.formula_rows(sheet, column).intersection(rows)
         return self._among[key]
 
     def is_formula(self, address: Address) -> bool:
@@ -154,43 +163,74 @@ def place(address: Address) -> str:
     return f"{quote(sheet)}!{get_column_letter(column)}{row}"
 
 
+@dataclass(frozen=True)
 class Inputs:
-    """Parameters and data that stand in a workbook, with the cells that hold them."""
+    """Parameters and data, with the layout that says which cells hold them.
 
-    def __init__(self, book: Opened, layout: Layout) -> None:
-        self.path, self.layout = book.path, layout
-        self._book = book
+    ``data[name]`` has None where there is no observation.
+    """
+
+    layout: Layout
+    parameters: dict[str, float]
+    data: dict[str, list[float | None]]
+
+    @classmethod
+    def of(cls, layout: Layout, run: Run) -> Inputs:
+        """The inputs of a run."""
         model = layout.model
-        self.parameters = {
-            name: p.checked(self._content(layout.scalars[name]), self._where(layout.scalars[name]))
-            for name, p in model.parameters.items()
-        }
-        self.data = {c.name: self._series(c.name) for c in model.table.values() if c.is_data}
+        series = {c.name: run.columns[c.name] for c in model.table.values() if c.is_data}
+        return cls(
+            layout,
+            {name: run.scalars[name] for name in model.parameters},
+            {name: [None if isnan(v) else v for v in values] for name, values in series.items()},
+        )
 
     def cells(self, name: str) -> list[Address]:
         """Cells of a data column."""
         sheet, column = self.layout.home(name)
         return [(sheet, FIRST_ROW + row, column) for row in range(self.layout.model.rows)]
 
-    def _series(self, name: str) -> list[float | None]:
-        column, cells = self.layout.model.table[name], self.cells(name)
-        sheet, row, number = cells[-1]
-        if self._book.value((sheet, row + 1, number)) is not None:
-            raise WorkbookError(
-                f"{self.path}: {place((sheet, row + 1, number))} lies below the table; "
-                f"its formulas end at row {row}"
-            )
-        series = [self._content(cell) for cell in cells]
-        for value, cell in zip(series, cells, strict=True):
-            if isinstance(value, str) or (value is None and not column.may_be_missing):
-                found = repr(value) if value else "empty"
-                raise DataError(f"{name}{self._where(cell)} is {found}; it must be a number")
-        return series
 
-    def _content(self, address: Address) -> Any:
-        """The number in a cell; of a formula, the value that the engine found."""
-        content = self._book.value(address)
-        return None if isinstance(content, str) and not content.strip() else content
+def inputs_in(book: Opened, layout: Layout) -> Inputs:
+    """Parameters and data that stand in a workbook.
 
-    def _where(self, address: Address) -> str:
-        return f" in {place(address)} of {self.path.name}"
+    Raises
+    ------
+    WorkbookError
+        If there is something below a table, where no formula looks.
+    DataError
+        If a parameter or datum is not allowed.
+    """
+    inputs = Inputs(layout, {}, {})
+    for name, parameter in layout.model.parameters.items():
+        cell = layout.scalars[name]
+        inputs.parameters[name] = parameter.checked(_content(book, cell), _where(book, cell))
+    for column in layout.model.table.values():
+        if column.is_data:
+            inputs.data[column.name] = _series(book, column, inputs.cells(column.name))
+    return inputs
+
+
+def _series(book: Opened, column: Column, cells: list[Address]) -> list[float | None]:
+    sheet, row, number = cells[-1]
+    if book.value((sheet, row + 1, number)) is not None:
+        raise WorkbookError(
+            f"{book.path}: {place((sheet, row + 1, number))} lies below the table; "
+            f"its formulas end at row {row}"
+        )
+    series = [_content(book, cell) for cell in cells]
+    for value, cell in zip(series, cells, strict=True):
+        if isinstance(value, str) or (value is None and not column.may_be_missing):
+            found = repr(value) if value else "empty"
+            raise DataError(f"{column.name}{_where(book, cell)} is {found}; it must be a number")
+    return series
+
+
+def _content(book: Opened, address: Address) -> Any:
+    """The number in a cell; of a formula, the value that the engine found."""
+    content = book.value(address)
+    return None if isinstance(content, str) and not content.strip() else content
+
+
+def _where(book: Opened, address: Address) -> str:
+    return f" in {place(address)} of {book.path.name}"

@@ -20,7 +20,8 @@ import openpyxl
 from openpyxl.utils.exceptions import InvalidFileException
 
 from kfsheet.errors import EngineError, WorkbookError
-from kfsheet.excel.engine import TIMEOUT, Apart, IronCalc, Values
+from kfsheet.excel.apart import TIMEOUT, Apart
+from kfsheet.excel.engine import IronCalc, Values
 from kfsheet.excel.stripping import Changes, strip_values
 from kfsheet.processes import completed
 
@@ -39,15 +40,11 @@ class Engine(Protocol):
         ...
 
 
-class Asked(Protocol):
-    """A workbook in an engine that is asked first and answers later, one question at a time."""
+class Asked(Engine, Protocol):
+    """A workbook in an engine that can be told beforehand what will be wanted."""
 
     def ask(self, changes: Changes | None = None) -> None:
-        """Calculate, with numbers put in first."""
-        ...
-
-    def answer(self) -> Values:
-        """Values of all cells that are not empty."""
+        """Say what numbers may be put in; an engine that can begins to calculate."""
         ...
 
 
@@ -90,7 +87,7 @@ def open_in(path: str | Path, engine: str = "ironcalc") -> Engine:
 def ask_about(path: str | Path, engine: str = "ironcalc") -> Asked:
     """An engine that is asked about a file as it stands; see :func:`recalculate`.
 
-    IronCalc works in a process of its own meanwhile, LibreOffice once the answer is wanted.
+    IronCalc works in a process of its own meanwhile, LibreOffice once the values are wanted.
     """
     asked = Apart(path) if engine == "ironcalc" else open_in(path, engine)
     asked.ask()
@@ -132,15 +129,9 @@ class LibreOffice:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._asked: Changes | None = None
 
     def ask(self, changes: Changes | None = None) -> None:
-        """What :meth:`answer` will calculate."""
-        self._asked = changes
-
-    def answer(self) -> Values:
-        """Values of all cells, with the numbers asked for."""
-        return self.values(self._asked)
+        """Nothing begins here: it takes seconds, perhaps in vain."""
 
     def values(self, changes: Changes | None = None) -> Values:
         """Values of all cells that are not empty, with numbers put in first."""
