@@ -48,15 +48,17 @@ class Unit:
         return Unit({symbol: power for symbol, power in powers.items() if power})
 
     def __pow__(self, exponent: float) -> Unit:
-        return Unit({symbol: power * exponent for symbol, power in self.powers.items()})
+        powers = {symbol: power * exponent for symbol, power in self.powers.items()}
+        return Unit({symbol: power for symbol, power in powers.items() if power})
 
     def __truediv__(self, other: Unit) -> Unit:
         return self * other**-1
 
     def __str__(self) -> str:
         """As pint writes it: first what is multiplied, then what divides."""
-        up = [s + _exponent(p) for s, p in sorted(self.powers.items()) if p > 0]
-        down = ["/" + s + _exponent(-p) for s, p in sorted(self.powers.items()) if p < 0]
+        powers = sorted(self.powers.items(), key=lambda item: item[0].lower())
+        up = [symbol + _exponent(power) for symbol, power in powers if power > 0]
+        down = [f"/{symbol}{_exponent(-power)}" for symbol, power in powers if power < 0]
         return (" ".join(up) or "1" * bool(down)) + "".join(down)
 
 

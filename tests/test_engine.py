@@ -3,7 +3,9 @@
 import datetime
 import os
 import re
+import signal
 import subprocess
+import sys
 import time
 import zipfile
 from pathlib import Path
@@ -11,16 +13,33 @@ from pathlib import Path
 import numpy as np
 import openpyxl
 import pytest
+from openpyxl.comments import Comment
 
 from kfsheet import EngineError, WorkbookError
 from kfsheet.coursework.engine import calculated
 from kfsheet.excel.apart import Apart
 from kfsheet.excel.engine import IronCalc
+from kfsheet.excel.finish import untouched
 from kfsheet.excel.recalculate import recalculate
 from kfsheet.processes import completed
 
 FOOTBALL = Path(__file__).parents[1] / "workbooks" / "football.xlsx"
+CANNONBALL = FOOTBALL.with_name("cannonball.xlsx")
 KICK = {"Parameters": {(5, 2): np.float64(25.0)}}
+HARDER = {"Parameters": {(5, 2): 30.0}}
+
+
+def rewrite(old: Path, new: Path, parts: str, pattern: bytes, replacement: bytes) -> None:
+    """Copy a workbook with a pattern replaced in some of its parts; it must be there."""
+    with zipfile.ZipFile(old) as source, zipfile.ZipFile(new, "w") as target:
+        changed = 0
+        for item in source.infolist():
+            content = source.read(item)
+            if re.fullmatch(parts, item.filename):
+                content, count = re.subn(pattern, replacement, content)
+                changed += count
+            target.writestr(item.filename, content)
+    assert changed
 
 
 def test_a_process_of_its_own_finds_what_this_one_finds_with_other_numbers_too():
@@ -28,6 +47,69 @@ def test_a_process_of_its_own_finds_what_this_one_finds_with_other_numbers_too()
     for changes in (None, KICK, None):
         apart.ask(changes)
         assert apart.values(changes) == here.values(changes)
+
+
+def test_questions_that_are_asked_together_do_not_see_each_others_numbers():
+    here, apart = IronCalc(FOOTBALL), Apart(FOOTBALL)
+    for changes in (KICK, None, HARDER):
+        apart.ask(changes)
+    for changes in (KICK, None, HARDER):
+        assert apart.values(changes) == here.values(changes)
+
+
+def test_what_was_asked_in_vain_is_passed_over():
+    apart = Apart(FOOTBALL)
+    for changes in (KICK, None, HARDER):
+        apart.ask(changes)
+    assert apart.values(HARDER) == IronCalc(FOOTBALL).values(HARDER)
+    assert apart.values() == IronCalc(FOOTBALL).values()
+
+
+def test_a_system_that_cannot_fork_finds_the_same(monkeypatch):
+    def command(module: str, function: str, *arguments: str) -> list[str]:
+        program = f"import os, sys; del os.fork; from {module} import {function} as main; "
+        return [sys.executable, "-c", program + "main(*sys.argv[1:])", *arguments]
+
+    monkeypatch.setattr("kfsheet.excel.apart.command", command)
+    here, apart = IronCalc(FOOTBALL), Apart(FOOTBALL)
+    for changes in (None, KICK, HARDER):
+        apart.ask(changes)
+    for changes in (None, HARDER, KICK):
+        assert apart.values(changes) == here.values(changes)
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds a fork as Linux does")
+def test_a_fork_that_dies_is_an_error_and_not_an_answer():
+    apart, number = Apart(CANNONBALL), 0
+    apart.ask()
+    forks = Path(f"/proc/{apart._process.pid}/task/{apart._process.pid}/children")
+    end = time.monotonic() + 60
+    while not number and time.monotonic() < end:
+        number = int(forks.read_text() or 0)
+    os.kill(number, signal.SIGKILL)
+    apart.ask(KICK)
+    with pytest.raises(EngineError, match="ended while it calculated"):
+        apart.values()
+
+
+def test_values_that_are_stored_in_a_file_of_ours_are_not_believed(tmp_path):
+    """IronCalc reads such a file as it is."""
+    path, value = tmp_path / "a.xlsx", rb"(</f>|<f [^>]*/>)<v>[^<]*</v>"
+    rewrite(FOOTBALL, path, r"xl/worksheets/sheet\d+\.xml", value, rb"\1<v>42</v>")
+    assert IronCalc(path).values() == IronCalc(FOOTBALL).values()
+    assert untouched(path)
+
+
+def test_a_file_that_only_says_that_it_is_ours_is_read_too(tmp_path):
+    """IronCalc cannot load openpyxl's comments; the program that is named is ours all the same."""
+    book = openpyxl.load_workbook(FOOTBALL)
+    book["Parameters"]["B40"].comment = Comment("Is this right?", "a reader")
+    book.save(tmp_path / "saved.xlsx")
+    path = tmp_path / "a.xlsx"
+    name = rb"(<Application>)[^<]*"
+    rewrite(tmp_path / "saved.xlsx", path, r"docProps/app\.xml", name, rb"\1kfsheet")
+    assert untouched(path)
+    assert IronCalc(path).values(KICK)["Parameters"][5, 2] == 25
 
 
 def test_an_engine_that_ends_is_an_error_in_one_line():
@@ -64,7 +146,7 @@ def test_what_cannot_be_read_is_said_by_the_process_too(tmp_path):
 
 
 def test_an_engine_that_is_no_longer_wanted_is_stopped_at_work():
-    apart = Apart(FOOTBALL.with_name("cannonball.xlsx"))
+    apart = Apart(CANNONBALL)
     apart.ask()
     process = apart._process
     del apart
@@ -87,13 +169,8 @@ def test_what_an_engine_prints_is_no_answer(tmp_path):
 def test_an_engine_that_panics_is_an_error_that_names_the_file(tmp_path):
     """A name of a sheet that the file does not have; Rust's panic is no Exception to Python."""
     path = tmp_path / "a.xlsx"
-    with zipfile.ZipFile(FOOTBALL) as old, zipfile.ZipFile(path, "w") as new:
-        for item in old.infolist():
-            content = old.read(item)
-            if item.filename == "xl/workbook.xml":
-                odd = b'<definedName name="odd" localSheetId="99">Parameters!$B$5</definedName>'
-                content = content.replace(b"<definedNames>", b"<definedNames>" + odd)
-            new.writestr(item.filename, content)
+    odd = b'<definedName name="odd" localSheetId="99">Parameters!$B$5</definedName>'
+    rewrite(FOOTBALL, path, r"xl/workbook\.xml", rb"<definedNames>", rb"\g<0>" + odd)
     apart = Apart(path)
     apart.ask()
     for compute in (lambda: recalculate(path), apart.values):
@@ -102,16 +179,19 @@ def test_an_engine_that_panics_is_an_error_that_names_the_file(tmp_path):
 
 
 def test_an_engine_leaves_no_copy_behind(tmp_path, monkeypatch):
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    monkeypatch.setenv("TMPDIR", str(tmp_path))
-    apart = Apart(FOOTBALL.with_name("cannonball.xlsx"))
+    path = tmp_path / "by_another_program.xlsx"  # ours are read as they are
+    rewrite(CANNONBALL, path, r"docProps/app\.xml", rb"kfsheet", b"Another")
+    folder = tmp_path / "copies"
+    folder.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(folder))
+    apart = Apart(path)
     apart.ask()
     end = time.monotonic() + 60
-    while not list(tmp_path.rglob("*.xlsx")) and time.monotonic() < end:
+    while not list(folder.rglob("*.xlsx")) and time.monotonic() < end:
         time.sleep(0.001)
-    assert list(tmp_path.rglob("*.xlsx"))
+    assert list(folder.rglob("*.xlsx"))
     del apart
-    assert not list(tmp_path.iterdir())
+    assert not list(folder.iterdir())
 
 
 @pytest.mark.skipif(os.name == "nt", reason="asks for a process as Unix does")
