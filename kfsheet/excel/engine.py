@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from itertools import groupby, starmap
 from operator import itemgetter
 from pathlib import Path
-from typing import Any
 
 from kfsheet.errors import EngineError
-from kfsheet.excel.finish import untouched
-from kfsheet.excel.stripping import Changes, strip_values
+from kfsheet.excel.stripping import Changes, copy_for_ironcalc
 
 CellValue = float | int | str | bool | None
 Place = tuple[int, int, int]
@@ -37,31 +35,19 @@ def _words(words: str) -> Iterator[None]:
         raise EngineError(f"{words}: {first}") from None
 
 
-def _model_of(path: Path, folder: str | None) -> Any:
-    """A workbook that IronCalc has loaded: as it is if it is as we built it, else a copy.
-
-    IronCalc computes every formula whatever value is stored with it, but there are things in other
-    programs' files that it cannot take or takes wrongly; see :mod:`kfsheet.excel.stripping`.
-    """
-    import ironcalc
-
-    if untouched(path):
-        with suppress(EngineError), _words("so it gets a copy"):
-            return ironcalc.load_from_xlsx(str(path), "en", "UTC")
-    with tempfile.TemporaryDirectory(prefix="kfsheet-", dir=folder) as own:
-        copy = Path(own) / "copy.xlsx"
-        strip_values(path, copy)
-        with _words(f"IronCalc cannot read {path}"):
-            return ironcalc.load_from_xlsx(str(copy), "en", "UTC")
-
-
 class IronCalc:
     """A workbook in IronCalc: loaded once, calculated as often as inputs change."""
 
     def __init__(self, path: Path, folder: str | None = None) -> None:
         """``folder`` is where a copy of the file may lie for a moment."""
+        import ironcalc
+
         self._path = path
-        self._model = _model_of(path, folder)
+        with tempfile.TemporaryDirectory(prefix="kfsheet-", dir=folder) as own:
+            copy = Path(own) / "copy.xlsx"
+            copy_for_ironcalc(path, copy)
+            with _words(f"IronCalc cannot read {path}"):
+                self._model = ironcalc.load_from_xlsx(str(copy), "en", "UTC")
         self._titles = [sheet["name"] for sheet in self._model.get_worksheets_properties()]
         self._before: dict[Place, CellValue] = {}
         self._places: list[Place] = []

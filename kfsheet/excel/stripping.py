@@ -1,4 +1,4 @@
-"""Copies of workbooks without the stored values of formulas.
+"""Copies of workbooks that an engine can take, without the stored values of formulas.
 
 Worksheets of 10 MB are changed by regular expressions that look at tags, whatever their prefix: an
 XML parser needs a second for what is a question of a tenth.
@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import re
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 from kfsheet.excel.archive import refusing, worksheet_parts
+from kfsheet.excel.finish import untouched
+from kfsheet.excel.sharing import shared
 
 Changes = dict[str, dict[tuple[int, int], float | None]]
 """Numbers to put into cells before calculating, by sheet and (row, column); None empties one."""
@@ -41,30 +44,58 @@ def strip_values(path: str | Path, copy: str | Path, changes: Changes | None = N
     WorkbookError
         If the file cannot be read or is no workbook.
     """
-    with refusing(path), zipfile.ZipFile(path) as old, zipfile.ZipFile(copy, "w") as new:
+    with refusing(path), zipfile.ZipFile(path) as old:
         parts = worksheet_parts(old) if changes else {}
         numbers = {parts[sheet]: cells for sheet, cells in (changes or {}).items()}
+
+        def rewritten(name: str, xml: bytes) -> bytes:
+            xml = _without_values(xml)
+            return _with_numbers(xml, numbers[name]) if name in numbers else xml
+
+        _copy(old, copy, rewritten)
+
+
+def copy_for_ironcalc(path: str | Path, copy: str | Path) -> None:
+    """Copy a workbook so that IronCalc can load it, and soon.
+
+    IronCalc computes every formula whatever value is stored with it; in files that are not as we
+    built them the values go all the same, since others store what IronCalc does not know.
+
+    Raises
+    ------
+    WorkbookError
+        If the file cannot be read or is no workbook.
+    """
+    ours = untouched(Path(path))
+
+    def rewritten(_: str, xml: bytes) -> bytes:
+        return shared(xml if ours else _without_values(xml))
+
+    with refusing(path), zipfile.ZipFile(path) as old:
+        _copy(old, copy, rewritten)
+
+
+def _copy(old: zipfile.ZipFile, copy: str | Path, rewritten: Callable[[str, bytes], bytes]) -> None:
+    """Copy a workbook without comments, its worksheets rewritten."""
+    with zipfile.ZipFile(copy, "w") as new:
         for item in old.infolist():
             content = old.read(item)
             if WORKSHEET.fullmatch(item.filename):
-                content = DRAWING.sub(b"", _stripped(content))
-                if item.filename in numbers:
-                    content = _with_numbers(content, numbers[item.filename])
+                content = DRAWING.sub(b"", rewritten(item.filename, content))
+                content = EMPTY.sub(rb"\1\2", content) if b't="n"' in content else content
             elif item.filename.startswith("xl/worksheets/_rels/"):
                 content = COMMENTS.sub(b"", content)
             new.writestr(item.filename, content)
 
 
-def _stripped(xml: bytes) -> bytes:
+def _without_values(xml: bytes) -> bytes:
     found = PREFIX.search(xml)
     prefix = {b"p": (found and found[1]) or b""}
     # An empty value, not none at all: IronCalc reports a formula that lacks the element.
     for stored, emptied, needed in zip(STORED, EMPTIED, (b"", b"shared"), strict=True):
         if needed in xml:
             xml = re.sub(stored % prefix, emptied % prefix, xml)
-    if any(kind in xml for kind in KINDS):
-        xml = TYPED.sub(b"", xml)
-    return EMPTY.sub(rb"\1\2", xml) if b't="n"' in xml else xml
+    return TYPED.sub(b"", xml) if any(kind in xml for kind in KINDS) else xml
 
 
 def _with_numbers(xml: bytes, numbers: dict[tuple[int, int], float | None]) -> bytes:
