@@ -73,6 +73,15 @@ def test_what_was_asked_in_vain_is_passed_over():
     assert apart.values() == IronCalc(FOOTBALL).values()
 
 
+def test_a_question_about_a_worksheet_that_is_not_there_is_an_error_and_the_next_is_answered():
+    apart, elsewhere = Apart(FOOTBALL), {"Elsewhere": {(1, 1): 2.0}}
+    apart.ask(elsewhere)
+    apart.ask(KICK)
+    with pytest.raises(EngineError, match="has no worksheet 'Elsewhere'"):
+        apart.values(elsewhere)
+    assert apart.values(KICK) == IronCalc(FOOTBALL).values(KICK)
+
+
 def test_a_system_that_cannot_fork_finds_the_same(monkeypatch):
     def command(module: str, function: str, *arguments: str) -> list[str]:
         program = f"import os, sys; del os.fork; from {module} import {function} as main; "

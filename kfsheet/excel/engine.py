@@ -62,6 +62,8 @@ class IronCalc:
         """All cells, and the values of one after the other, with numbers put in first."""
         self._restore()
         for sheet, cells in (changes or {}).items():
+            if sheet not in self._titles:
+                raise EngineError(f"{self._path} has no worksheet {sheet!r} to put numbers in")
             number = self._titles.index(sheet)
             for (row, column), value in cells.items():
                 self._put(number, row, column, value)
