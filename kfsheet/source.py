@@ -32,9 +32,10 @@ def python_source(model: Recurrence, wanted: Collection[str] | None = None) -> s
         columns = [c for c in columns if c.is_data or c.name in known]
         summaries = [s for s in summaries if s.name in known]
     body = [*_head(model), *_scalar_lines(derived), *_table_lines(model, columns)]
+    kept = {item.name for item in (*columns, *summaries)}
     for step in model.passes():
-        rows = tuple(tuple(c for c in row if c in columns) for row in step.rows)
-        after = tuple(s for s in step.summaries if s in summaries)
+        rows = tuple(tuple(c for c in row if c.name in kept) for row in step.rows)
+        after = tuple(s for s in step.summaries if s.name in kept)
         body += [*_row_lines(Pass(rows, after)), *_scalar_lines(after)]
     body += _return_lines(columns, [*derived, *summaries])
     text = "\n".join(body)

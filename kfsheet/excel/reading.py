@@ -43,7 +43,6 @@ class Opened:
         self.engine = asked or ask_about(path, engine)
         self.package = Package(path)
         self._among: dict[tuple[range, str, int], set[int]] = {}
-        self._formulas = {title: self.package.formulas(title) for title in self.package.titles}
 
     @cached_property
     def values(self) -> Values:
@@ -58,6 +57,10 @@ class Opened:
         """What the engine found in a cell."""
         sheet, row, column = address
         return self.values.get(sheet, {}).get((row, column))
+
+    @cached_property
+    def _formulas(self) -> dict[str, dict[int, set[int]]]:
+        return {title: self.package.formulas(title) for title in self.package.titles}
 
     def formula_rows(self, sheet: str, column: int) -> set[int]:
         """Rows of a column that hold formulas."""
