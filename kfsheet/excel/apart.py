@@ -63,7 +63,7 @@ class Apart:
         if plain not in self._asked:
             self._asked.append(plain)
             number = self._answered + len(self._asked)
-            self._desk.put("question", number, plain)
+            self._desk.put(f"question {number}", plain)
             with suppress(OSError):  # it has ended; the answer will say so
                 _tell(self._process.stdin, number)
 
@@ -72,7 +72,7 @@ class Apart:
         self.ask(changes)
         while self._asked.popleft() != (changes or {}):
             self._next()
-        kind, *found = self._desk.take("answer", self._next())
+        kind, *found = self._desk.take(f"answer {self._next()}")
         if kind != VALUES:
             raise {"WorkbookError": WorkbookError}.get(kind, EngineError)(*found)
         cells, values = found
@@ -92,7 +92,7 @@ class Apart:
 
     @cached_property
     def _cells(self) -> Cells:
-        return self._desk.take("cells", 0)
+        return self._desk.take("cells")
 
 
 class _Desk:
@@ -101,11 +101,11 @@ class _Desk:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
-    def put(self, kind: str, number: int, content: object) -> None:
-        (self.folder / f"{kind}-{number}").write_bytes(marshal.dumps(content))
+    def put(self, name: str, content: object) -> None:
+        (self.folder / name).write_bytes(marshal.dumps(content))
 
-    def take(self, kind: str, number: int) -> Any:
-        return marshal.loads((self.folder / f"{kind}-{number}").read_bytes())
+    def take(self, name: str) -> Any:
+        return marshal.loads((self.folder / name).read_bytes())
 
 
 def _tell(pipe: BinaryIO, number: int) -> None:
@@ -131,20 +131,20 @@ def main(path: str, folder: str) -> None:
     cells: Cells = {}
     forks: deque[_Fork] = deque()
     for number in _questions(source, forks, pipe):
-        changes = desk.take("question", number)
+        changes = desk.take(f"question {number}")
         try:
             if engine is None:
                 engine = IronCalc(Path(path), folder)
                 cells = engine.cells()
-                desk.put("cells", 0, cells)
+                desk.put("cells", cells)
         except KfsheetError as error:
-            desk.put("answer", number, (type(error).__name__, str(error)))
+            desk.put(f"answer {number}", (type(error).__name__, str(error)))
             _tell(pipe, number)
             continue
         if hasattr(os, "fork"):
             forks.append(_Fork(desk, number, engine, changes, cells))
         else:
-            desk.put("answer", number, _calculated(engine, changes, cells))
+            desk.put(f"answer {number}", _calculated(engine, changes, cells))
             _tell(pipe, number)
 
 
@@ -186,7 +186,7 @@ class _Fork:
             os.close(theirs)
             return
         try:
-            desk.put("answer", number, _calculated(engine, changes, told))
+            desk.put(f"answer {number}", _calculated(engine, changes, told))
         except BaseException:
             os._exit(1)
         os._exit(0)
