@@ -591,8 +591,9 @@ def test_a_secret_that_fits_no_file_is_told(course, tmp_path, capsys):
     assert "is --secret the right file?" in capsys.readouterr().err
 
 
-def test_readme_has_a_row_for_every_status():
-    readme = (Path(__file__).parents[1] / "README.md").read_text()
+def test_the_page_on_grading_has_a_row_for_every_status():
+    folder = Path(__file__).parents[1] / "kfsheet" / "coursework"
+    readme = (folder / "README.md").read_text(encoding="utf-8")
     for status in (*STATUSES, *CREDIT):
         assert f"| {status} |" in readme, status
 
