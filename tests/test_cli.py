@@ -8,7 +8,7 @@ from pathlib import Path
 import openpyxl
 import pytest
 
-from kfsheet import cli, load_exercise
+from kfsheet import load_exercise, terminal
 from kfsheet.cli import main
 from kfsheet.exercises import exercise_names
 
@@ -157,8 +157,8 @@ def test_a_reader_that_leaves_early_is_no_error():
 
 
 def test_a_terminal_sees_a_progress_bar(monkeypatch, capsys):
-    monkeypatch.setattr(cli.sys.stderr, "isatty", lambda: True)
-    assert list(cli.progress([1, 2], "build", 2)) == [1, 2]
+    monkeypatch.setattr(terminal.sys.stderr, "isatty", lambda: True)
+    assert list(terminal.progress([1, 2], "build", 2)) == [1, 2]
     assert "build" in capsys.readouterr().err
 
 
