@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO
 
@@ -58,6 +59,7 @@ def completed(arguments: Sequence[str], seconds: float) -> subprocess.CompletedP
 
 def kill(process: subprocess.Popen) -> None:
     """Stop a process that began a session of its own, and all that it started."""
-    if hasattr(os, "killpg") and process.poll() is None:
-        os.killpg(process.pid, signal.SIGKILL)
+    if hasattr(os, "killpg") and process.returncode is None:  # until then its number is its own
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
     process.kill()

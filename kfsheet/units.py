@@ -59,7 +59,7 @@ def parse_unit(text: str) -> Quantity:
         If pint does not know the unit; the message shows the forms that it reads.
     """
     try:
-        quantity = _registry().Quantity(1.0, re.sub(r"([A-Za-z])(\d)", r"\1**\2", text))
+        quantity = _registry().Quantity(1.0, re.sub(r"([^\W\d])(?=[0-9])", r"\1**", text))
     except Exception as error:  # pint raises a dozen kinds, among them tokenize's own
         raise ModelError(
             f"the unit {text!r} does not parse ({error}); write it like m, px, m/s2, 1/s, or ''"

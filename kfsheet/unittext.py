@@ -10,9 +10,11 @@ import re
 from collections import Counter
 from dataclasses import dataclass
 
+from kfsheet.errors import ModelError
+
 COMMON = frozenset("A Hz J K N Pa V W deg g kg m px rad s".split())
 """Symbols that pint reads, and that stand for themselves there: no prefix, no other name."""
-FACTOR = re.compile(r"([ */])([A-Za-z]+)(\d+(?:\.\d+)?)?")
+FACTOR = re.compile(r"([ */])([^\s*/\d.]+)([1-9][0-9]?(?:\.[0-9]+)?|0\.[0-9]+)?")
 SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -40,6 +42,8 @@ class Unit:
             from kfsheet.units import parse_unit, unit_text
 
             powers = _powers(unit_text(parse_unit(text)))
+        if powers is None:
+            raise ModelError(f"the unit {text!r} cannot be multiplied; write it like m, px, m/s2")
         return cls(powers)
 
     def __mul__(self, other: Unit) -> Unit:

@@ -55,6 +55,12 @@ def places(report):
     return [str(problem).split(": ")[0] for problem in report.problems]
 
 
+def quoted(place):
+    """A place as reports have it: 'Pixel frame'!I4."""
+    sheet, _, cell = place.partition("!")
+    return f"'{sheet}'!{cell}" if " " in sheet else place
+
+
 def test_an_untouched_workbook_holds(engine, football_file):
     report = check_workbook(football_file, exercise, engine)
     assert report.holds
@@ -195,6 +201,32 @@ def _mutant(formula):
     return flipped if flipped != formula else f"=2*({formula[1:]})"
 
 
+@pytest.mark.parametrize(
+    ("place", "formula"),
+    [
+        ("Pixel frame!I4", '=(-2*sigma_d_i)&""'),  # the right number, as a text
+        ("Reanalysis!G8", '=(1/3)&""'),
+        ("Reanalysis!G8", '="nan"'),
+        ("Reanalysis!G8", '="1_0"'),
+    ],
+)
+def test_a_text_that_reads_like_a_number_is_named(damaged, place, formula):
+    """A sum or a mean of the column passes over it, and Python would take it for a number."""
+    report = check_workbook(damaged({place: formula}), exercise)
+    assert quoted(place) in places(report)
+
+
+def test_a_number_that_looks_like_a_date_is_a_number(engine, football_file, tmp_path):
+    book = openpyxl.load_workbook(football_file)
+    for row, look in ((8, "yyyy-mm-dd"), (9, "hh:mm"), (10, "[h]:mm")):
+        book["Reanalysis"].cell(row, 7).number_format = look
+    book.save(tmp_path / "dates.xlsx")
+    found, expected = recalculate(tmp_path / "dates.xlsx", engine), recalculate(football_file)
+    for row in (8, 9, 10):
+        value = expected["Reanalysis"][row, 7]
+        assert found["Reanalysis"][row, 7] == pytest.approx(value, rel=1e-6, abs=1e-6)
+
+
 def test_two_damaged_cells_are_both_reported(damaged):
     path = damaged({"Reanalysis!G9": "=K8", "Free run!F12": "=0"})
     assert places(check_workbook(path, exercise)) == ["Reanalysis!G9", "'Free run'!F12"]
@@ -244,6 +276,7 @@ def test_a_workbook_saved_by_libreoffice_still_holds(football_file, tmp_path):
         ({"Parameters!B5": "soon"}, "Parameters!B5.*'soon'; it must be a number"),
         ({"Parameters!B5": None}, "Parameters!B5.*None; it must be a number"),
         ({"Reanalysis!C9": "blurred"}, "i in Reanalysis!C9.*'blurred'; it must be a number"),
+        ({"Reanalysis!C9": True}, "i in Reanalysis!C9.*True; it must be a number"),
         ({"Errors!C9": None}, "x_true in Errors!C9.*empty; it must be a number"),
     ],
 )

@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 import zipfile
 from pathlib import Path
@@ -13,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import openpyxl
 import pytest
+from archives import rewrite, say_it_is_ours
 from openpyxl.comments import Comment
 
 from kfsheet import EngineError, WorkbookError
@@ -27,19 +29,6 @@ FOOTBALL = Path(__file__).parents[1] / "workbooks" / "football.xlsx"
 CANNONBALL = FOOTBALL.with_name("cannonball.xlsx")
 KICK = {"Parameters": {(5, 2): np.float64(25.0)}}
 HARDER = {"Parameters": {(5, 2): 30.0}}
-
-
-def rewrite(old: Path, new: Path, parts: str, pattern: bytes, replacement: bytes) -> None:
-    """Copy a workbook with a pattern replaced in some of its parts; it must be there."""
-    with zipfile.ZipFile(old) as source, zipfile.ZipFile(new, "w") as target:
-        changed = 0
-        for item in source.infolist():
-            content = source.read(item)
-            if re.fullmatch(parts, item.filename):
-                content, count = re.subn(pattern, replacement, content)
-                changed += count
-            target.writestr(item.filename, content)
-    assert changed
 
 
 def is_running(process: int) -> bool:
@@ -82,10 +71,32 @@ def test_a_question_about_a_worksheet_that_is_not_there_is_an_error_and_the_next
     assert apart.values(KICK) == IronCalc(FOOTBALL).values(KICK)
 
 
-def test_a_system_that_cannot_fork_finds_the_same(monkeypatch):
+def fail_to_fork(after: int | None) -> None:
+    """Let this process fork so many times, and then no more; None where nothing knows of forks."""
+    fork, left = os.fork, iter(range(after or 0))
+
+    def few() -> int:
+        if next(left, None) is None:
+            raise BlockingIOError("no more processes")
+        return fork()
+
+    os.fork = few
+    if after is None:
+        del os.fork
+
+
+@pytest.mark.parametrize("left", [None, 0, 1], ids=["on Windows", "at all", "after the first"])
+def test_where_nothing_can_be_forked_the_answers_are_the_same(monkeypatch, left):
     def command(module: str, function: str, *arguments: str) -> list[str]:
-        program = f"import os, sys; del os.fork; from {module} import {function} as main; "
-        return [sys.executable, "-c", program + "main(*sys.argv[1:])", *arguments]
+        program = "import os, sys; from test_engine import fail_to_fork; "
+        program += f"fail_to_fork({left}); from {module} import {function} as main; "
+        path = f"sys.path.insert(0, {str(Path(__file__).parent)!r}); "
+        return [
+            sys.executable,
+            "-c",
+            "import sys; " + path + program + "main(*sys.argv[1:])",
+            *arguments,
+        ]
 
     monkeypatch.setattr("kfsheet.excel.apart.command", command)
     here, apart = IronCalc(FOOTBALL), Apart(FOOTBALL)
@@ -122,11 +133,46 @@ def test_a_file_that_only_says_that_it_is_ours_is_read_too(tmp_path):
     book = openpyxl.load_workbook(FOOTBALL)
     book["Parameters"]["B40"].comment = Comment("Is this right?", "a reader")
     book.save(tmp_path / "saved.xlsx")
-    path = tmp_path / "a.xlsx"
-    name = rb"(<Application>)[^<]*"
-    rewrite(tmp_path / "saved.xlsx", path, r"docProps/app\.xml", name, rb"\1kfsheet")
+    path = say_it_is_ours(tmp_path / "saved.xlsx", tmp_path / "a.xlsx")
     assert untouched(path)
     assert IronCalc(path).values(KICK)["Parameters"][5, 2] == 25
+
+
+@pytest.mark.skipif(os.name == "nt", reason="stops a process as Unix does")
+def test_who_is_interrupted_while_waiting_gets_the_right_answer_the_next_time():
+    apart, before = Apart(FOOTBALL), threading.active_count()
+    apart.values()
+    os.kill(apart._process.pid, signal.SIGSTOP)
+    here = threading.get_ident()
+    interrupt = threading.Timer(0.5, signal.pthread_kill, [here, signal.SIGINT])
+    interrupt.start()
+    with pytest.raises(KeyboardInterrupt):
+        apart.values(KICK)
+    end = time.monotonic() + 10
+    while threading.active_count() > before and time.monotonic() < end:
+        time.sleep(0.01)
+    assert threading.active_count() == before  # no timer, for which the interpreter would wait
+    os.kill(apart._process.pid, signal.SIGCONT)
+    assert apart.values(HARDER) == IronCalc(FOOTBALL).values(HARDER)
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds a process as Linux does")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_a_command_that_is_ended_leaves_neither_processes_nor_files(tmp_path, number):
+    around = {**os.environ, "TMPDIR": str(tmp_path)}
+    program = [sys.executable, "-m", "kfsheet", "check", str(CANNONBALL)]
+    with subprocess.Popen(program, env=around, stderr=subprocess.PIPE) as command:
+        children, end = Path(f"/proc/{command.pid}/task/{command.pid}/children"), 0
+        while not list(tmp_path.glob("*/question 1")):
+            time.sleep(0.01)
+        engine = int(children.read_text())
+        os.kill(command.pid, number)
+        assert command.wait(10) in (2, -number)
+    end = time.monotonic() + 20
+    while (is_running(engine) or list(tmp_path.iterdir())) and time.monotonic() < end:
+        time.sleep(0.01)
+    assert not is_running(engine)
+    assert not list(tmp_path.iterdir())
 
 
 def test_an_engine_that_ends_is_an_error_in_one_line():

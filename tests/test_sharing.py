@@ -1,15 +1,19 @@
 """The copy that IronCalc is given shares formulas, and no number in it differs from the file's."""
 
+import zipfile
 from pathlib import Path
 
 import ironcalc
 import openpyxl
 import pytest
+from archives import say_it_is_ours
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from openpyxl.workbook.defined_name import DefinedName
 
 from kfsheet.excel.engine import IronCalc
 from kfsheet.excel.sharing import shared
+from kfsheet.excel.stripping import copy_for_ironcalc
 
 WORKBOOKS = sorted((Path(__file__).parents[1] / "workbooks").glob("*.xlsx"))
 OTHER = "Q 5"  # a worksheet whose name looks like a reference
@@ -28,6 +32,14 @@ STAYING = [  # a text or a name that only looks like a reference that moves
     "A2+B3",
     'A{0}&"\'"',
     '"S!A{0}"&A{0}',
+    "b1*2",  # the same as B1*2, which moves
+    "$a1+B{0}",
+    "sum(a1:b1)",
+    "SUM(S!2:2)+A{0}",
+    "SUM($2:3)",
+    "A1048570+A{0}",
+    "caf\u00e9B{0}",  # a name that ends like a reference
+    'A{0}&CHAR(65)&"#"',
 ]
 
 
@@ -59,7 +71,12 @@ def written(path: Path, columns: list[list[str]]) -> None:
         for row, rule in enumerate(column, 1):
             book["T"].cell(row, at, "=" + rule.format(row, row + 1))
     del book["Sheet"]
-    book.save(path)
+    for row in range(1, 9):
+        place = DefinedName(f"caf\u00e9B{row}", attr_text=f"S!$A${row}")
+        book.defined_names[place.name] = place
+    unsaid = path.with_name("unsaid.xlsx")
+    book.save(unsaid)
+    say_it_is_ours(unsaid, path)  # only in files of ours are formulas shared
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -91,6 +108,14 @@ def test_a_formula_that_is_filled_down_is_written_once(rule):
 def test_a_formula_that_is_not_filled_down_is_not_shared(rule):
     column = "".join(f'<c r="C{r}"><f>{rule.format(r, r + 1)}</f></c>' for r in range(4, 9))
     assert '"/>' not in shared(column.encode()).decode()
+
+
+def test_the_files_of_other_programs_are_left_alone(tmp_path):
+    written(tmp_path / "ours.xlsx", [["A{0}+S!B{0}"] * 7])
+    for name, groups in (("ours.xlsx", 1), ("unsaid.xlsx", 0)):
+        copy_for_ironcalc(tmp_path / name, tmp_path / "copy.xlsx")
+        with zipfile.ZipFile(tmp_path / "copy.xlsx") as archive:
+            assert archive.read("xl/worksheets/sheet1.xml").count(b'"shared" ref=') == groups
 
 
 def test_a_cell_without_an_address_is_left_as_it_is():

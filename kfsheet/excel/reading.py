@@ -223,8 +223,8 @@ def _series(book: Opened, column: Column, cells: list[Address]) -> list[float | 
         )
     series = [_content(book, cell) for cell in cells]
     for value, cell in zip(series, cells, strict=True):
-        if isinstance(value, str) or (value is None and not column.may_be_missing):
-            found = repr(value) if value else "empty"
+        if isinstance(value, str | bool) or (value is None and not column.may_be_missing):
+            found = "empty" if value is None else repr(value)
             raise DataError(f"{column.name}{_where(book, cell)} is {found}; it must be a number")
     return series
 

@@ -6,6 +6,7 @@ engine is given a copy whose formulas have no values.
 
 from __future__ import annotations
 
+import datetime
 import shutil
 import subprocess
 import tempfile
@@ -13,15 +14,16 @@ import warnings
 import zipfile
 import zlib
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 from xml.etree.ElementTree import ParseError
 
 import openpyxl
+from openpyxl.utils.datetime import to_excel
 from openpyxl.utils.exceptions import InvalidFileException
 
 from kfsheet.errors import EngineError, WorkbookError
 from kfsheet.excel.apart import TIMEOUT, Apart
-from kfsheet.excel.engine import IronCalc, Values
+from kfsheet.excel.engine import CellValue, IronCalc, Values
 from kfsheet.excel.stripping import Changes, strip_values
 from kfsheet.processes import completed
 
@@ -142,13 +144,19 @@ class LibreOffice:
             book = open_workbook(converted, data_only=True)
         return {
             sheet.title: {
-                (cell.row, cell.column): cell.value
+                (cell.row, cell.column): _number_of_a_date(cell.value, book.epoch)
                 for row in sheet.iter_rows()
                 for cell in row
                 if cell.value is not None
             }
             for sheet in book.worksheets
         }
+
+
+def _number_of_a_date(value: Any, epoch: datetime.datetime) -> CellValue:
+    """What a cell holds that only looks like a date; openpyxl goes by the look."""
+    dates = datetime.date | datetime.time | datetime.timedelta
+    return to_excel(value, epoch) if isinstance(value, dates) else value
 
 
 def convert(path: Path, folder: Path, kind: str) -> Path:

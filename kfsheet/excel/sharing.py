@@ -2,7 +2,8 @@
 
 Excel cannot share a formula that refers to another worksheet, so that in our workbooks each such
 cell has its own. IronCalc can, and reads a shared formula at once: the copy that it is given shares
-every formula that is the one above, filled down.
+every formula that is the one above, filled down. What references move is read here as our own
+formulas are written; a formula that holds anything else is left alone.
 """
 
 from __future__ import annotations
@@ -12,6 +13,13 @@ from itertools import count
 
 RELATIVE = re.compile(rb"(?<![\w.$])(\$?[A-Z]{1,3})([1-9][0-9]*)(?![\w.(!])")
 """A reference whose row moves when a formula is filled down."""
+UNSURE = re.compile(
+    rb"[^ -~]|[\[\]{}@#'\\]|&(?!amp;|lt;|gt;|quot;)"  # texts, tables, other alphabets, entities
+    rb"|(?<![\w.$])\$?(?=[A-Z]*[a-z])[A-Za-z]{1,3}\$?[0-9]"  # a1, which is A1
+    rb"|[0-9]:\$?[0-9]"  # 5:5, a whole row
+    rb"|[0-9]{7}"  # rows near the end of a worksheet
+)
+"""What this module does not read as a spreadsheet does, or might not."""
 FIRST = 1_000_000_000  # number of a group; those that are in a file count from 0
 
 
@@ -57,10 +65,9 @@ def _address(before: bytes) -> tuple[bytes, int]:
 def _pattern(text: bytes, row: int) -> tuple[bytes, list[int]] | None:
     """A formula with a place for every row that moves, and how far each is from the cell's own.
 
-    None if it names a sheet or holds a text in quotes, in which a reference would be none.
+    None if it is not certain which references move, as within a text in quotes none does.
     """
-    plain = text.replace(b"&quot;", b'"').replace(b"&apos;", b"'")
-    if b"'" in plain or b'"' in plain.replace(b'""', b""):
+    if UNSURE.search(text) or b'"' in text.replace(b"&quot;", b'"').replace(b'""', b""):
         return None
     back: list[int] = []
 

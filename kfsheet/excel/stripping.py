@@ -58,8 +58,8 @@ def strip_values(path: str | Path, copy: str | Path, changes: Changes | None = N
 def copy_for_ironcalc(path: str | Path, copy: str | Path) -> None:
     """Copy a workbook so that IronCalc can load it, and soon.
 
-    IronCalc computes every formula whatever value is stored with it; in files that are not as we
-    built them the values go all the same, since others store what IronCalc does not know.
+    IronCalc computes every formula whatever value is stored with it. Formulas of a file that is as
+    we built it are shared; of others the values go, since they may be what IronCalc does not know.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def copy_for_ironcalc(path: str | Path, copy: str | Path) -> None:
     ours = untouched(Path(path))
 
     def rewritten(_: str, xml: bytes) -> bytes:
-        return shared(xml if ours else _without_values(xml))
+        return shared(xml) if ours else _without_values(xml)
 
     with refusing(path), zipfile.ZipFile(path) as old:
         _copy(old, copy, rewritten)

@@ -11,6 +11,8 @@ import numpy as np
 from kfsheet.excel.engine import SheetValues
 from kfsheet.excel.page import Filled
 
+NUMBERS = {float, int}  # a text such as "1.0" is none, though NumPy would read it
+
 
 class Whole:
     """What is expected of a column whose formulas are where they belong."""
@@ -43,11 +45,7 @@ class Whole:
 def _numbers(found: list[Any], missing: str) -> np.ndarray | None:
     """Values of a column, NaN where there is none; None if something else stands in it."""
     kinds = set(map(type, found))
-    if bool in kinds:
-        return None
-    if not kinds <= {float, int}:
+    if not kinds <= NUMBERS:
         found = [math.nan if v in (None, "", missing) else v for v in found]
-    try:
-        return np.array(found, dtype=float)
-    except ValueError:
-        return None
+        kinds = set(map(type, found))
+    return np.array(found, dtype=float) if kinds <= NUMBERS else None
