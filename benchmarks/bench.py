@@ -42,7 +42,7 @@ def main() -> None:
     parts = [preface()]
     for title, lines in GROUPS.items():
         parts.append(f"\n## {title}\n\n{HEAD}\n")
-        print(parts[-1], flush=True)
+        print(parts[-1], end="", flush=True)
         for line in lines():
             parts.append(row(line) + "\n")
             print(parts[-1], end="", flush=True)
