@@ -168,7 +168,8 @@ def _run_python(
             raise _failed(task, k, error) from None
         if reason := without_value(columns, scalars, task.gaps):
             raise _failed(task, k, reason)
-        out[k] = [columns[name] for name in task.kernel.columns]
+        if task.kernel.columns:
+            out[k] = [columns[name] for name in task.kernel.columns]
         results[k] = [scalars[name] for name in task.kernel.scalars]
 
 

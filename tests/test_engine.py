@@ -15,6 +15,7 @@ import numpy as np
 import openpyxl
 import pytest
 from archives import rewrite, say_it_is_ours
+from conftest import need
 from openpyxl.comments import Comment
 
 from kfsheet import EngineError, WorkbookError
@@ -23,6 +24,7 @@ from kfsheet.excel.apart import Apart
 from kfsheet.excel.engine import IronCalc
 from kfsheet.excel.finish import untouched
 from kfsheet.excel.recalculate import recalculate
+from kfsheet.excel.stripping import copy_for_ironcalc
 from kfsheet.processes import completed
 
 FOOTBALL = Path(__file__).parents[1] / "workbooks" / "football.xlsx"
@@ -116,8 +118,30 @@ def test_a_fork_that_dies_is_an_error_and_not_an_answer():
         number = int(forks.read_text() or 0)
     os.kill(number, signal.SIGKILL)
     apart.ask(KICK)
-    with pytest.raises(EngineError, match="ended while it calculated"):
-        apart.values()
+    for _ in range(2):
+        with pytest.raises(EngineError, match="ended while it calculated"):
+            apart.values()
+
+
+@pytest.mark.parametrize("engine", ["ironcalc", "libreoffice"])
+@pytest.mark.parametrize("number", [float("nan"), float("inf")])
+def test_what_no_cell_can_hold_is_refused(engine, number):
+    if engine == "libreoffice":
+        need(engine)
+    with pytest.raises(EngineError, match=r"cannot (hold|put)"):
+        recalculate(FOOTBALL, engine, {"Parameters": {(5, 2): number}})
+
+
+def test_after_numbers_that_are_refused_others_are_calculated():
+    apart, odd = Apart(FOOTBALL), {"Parameters": {(5, 2): float("nan"), (0, 0): 1.0}}
+    with pytest.raises(EngineError, match="cannot put numbers into"):
+        apart.values(odd)
+    assert apart.values(KICK) == IronCalc(FOOTBALL).values(KICK)
+
+
+def test_a_folder_without_room_for_a_copy_is_named(tmp_path):
+    with pytest.raises(EngineError, match=r"cannot be written to .*make room there"):
+        copy_for_ironcalc(FOOTBALL, tmp_path / "gone" / "copy.xlsx")
 
 
 def test_values_that_are_stored_in_a_file_of_ours_are_not_believed(tmp_path):

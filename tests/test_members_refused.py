@@ -63,3 +63,11 @@ def test_whole_numbers_of_numpy_are_whole_numbers():
 def test_nees_needs_names_of_states(states):
     with pytest.raises(DataError, match="NEES"):
         NEES(states)
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_a_study_may_ask_for_nothing(compiled):
+    study = evaluate(football, members=3, columns=[], scalars=(), compiled=compiled)
+    assert study.members == 3
+    assert not study.rows
+    assert not len(study.scalars)

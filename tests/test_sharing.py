@@ -74,6 +74,8 @@ def written(path: Path, columns: list[list[str]]) -> None:
     for row in range(1, 9):
         place = DefinedName(f"caf\u00e9B{row}", attr_text=f"S!$A${row}")
         book.defined_names[place.name] = place
+        place = DefinedName(f"YAW{row}", attr_text=f"S!$B${row}")
+        book.defined_names[place.name] = place
     unsaid = path.with_name("unsaid.xlsx")
     book.save(unsaid)
     say_it_is_ours(unsaid, path)  # only in files of ours are formulas shared

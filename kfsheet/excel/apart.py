@@ -39,7 +39,10 @@ VALUES = "values"  # the kind of an answer that is none of the errors
 
 
 class Apart:
-    """A workbook in IronCalc, apart. What will be wanted can be asked for before it is wanted."""
+    """A workbook in IronCalc, apart. What will be wanted can be asked for before it is wanted.
+
+    It is for one thread.
+    """
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
@@ -144,7 +147,7 @@ def main(path: str, folder: str) -> None:
     try:
         service.serve()
     finally:
-        service.end()
+        service.end()  # but whoever asked may still look into the folder
         shutil.rmtree(folder, ignore_errors=True)
 
 
@@ -185,9 +188,13 @@ class _Service:
         return False
 
     def end(self) -> None:
-        """Stop the forks that still calculate."""
+        """Stop the forks that still calculate, answer no more, and wait until nobody can ask."""
         for fork in self._forks:
             fork.kill()
+        with suppress(OSError):
+            self._pipe.close()
+        while self._source.read(2**16):
+            pass
 
     def _questions(self) -> Iterator[int]:
         """Numbers of questions as they come; those of answers are told meanwhile, in order."""

@@ -60,13 +60,14 @@ class IronCalc:
 
     def calculated(self, changes: Changes | None = None) -> tuple[Cells, list[CellValue]]:
         """All cells, and the values of one after the other, with numbers put in first."""
-        self._restore()
-        for sheet, cells in (changes or {}).items():
-            if sheet not in self._titles:
-                raise EngineError(f"{self._path} has no worksheet {sheet!r} to put numbers in")
-            number = self._titles.index(sheet)
-            for (row, column), value in cells.items():
-                self._put(number, row, column, value)
+        if unknown := [sheet for sheet in changes or {} if sheet not in self._titles]:
+            raise EngineError(f"{self._path} has no worksheet {unknown[0]!r} to put numbers in")
+        with _words(f"IronCalc cannot put numbers into {self._path}"):
+            self._restore()
+            for sheet, cells in (changes or {}).items():
+                number = self._titles.index(sheet)
+                for (row, column), value in cells.items():
+                    self._put(number, row, column, value)
         with _words(f"IronCalc cannot calculate {self._path}"):
             self._model.evaluate()
         cells = self.cells()

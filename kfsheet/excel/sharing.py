@@ -16,6 +16,8 @@ RELATIVE = re.compile(rb"(?<![\w.$])(\$?[A-Z]{1,3})([1-9][0-9]*)(?![\w.(!])")
 UNSURE = re.compile(
     rb"[^ -~]|[\[\]{}@#'\\]|&(?!amp;|lt;|gt;|quot;)"  # texts, tables, other alphabets, entities
     rb"|(?<![\w.$])\$?(?=[A-Z]*[a-z])[A-Za-z]{1,3}\$?[0-9]"  # a1, which is A1
+    rb"|(?<![\w.$])\$?(?:XF[E-Z]|X[G-Z][A-Z]|[YZ][A-Z]{2})\$?[0-9]"  # YAW1, a name: columns end
+    rb"|(?<![\w.$])\$?[A-Z]{1,3}\$?0[0-9]"  # A01, which is A1
     rb"|[0-9]:\$?[0-9]"  # 5:5, a whole row
     rb"|[0-9]{7}"  # rows near the end of a worksheet
 )

@@ -9,8 +9,11 @@ from __future__ import annotations
 import re
 import zipfile
 from collections.abc import Callable
+from io import BytesIO
+from math import isfinite
 from pathlib import Path
 
+from kfsheet.errors import EngineError
 from kfsheet.excel.archive import refusing, worksheet_parts
 from kfsheet.excel.finish import untouched
 from kfsheet.excel.sharing import shared
@@ -28,6 +31,7 @@ KINDS = [b't="%s"' % kind for kind in (b"str", b"n", b"b", b"e", b"s", b"d")]
 CELL = re.compile(rb"<((?:\w+:)?c)((?:\s[^>]*)?)(?:/>|(?<!/)>.*?</\1>)", re.DOTALL)
 TYPE = re.compile(rb'\s+t="[^"]*"')
 ADDRESS = re.compile(rb'\sr="([A-Z]+\d+)"')
+STYLE = re.compile(rb'(<(?:\w+:)?c\b[^>]*?)\ss="[0-9]+"')
 # openpyxl types an empty cell as a number, and IronCalc then reads a 0: a photo that is not there.
 EMPTY = re.compile(rb'(<(?:\w+:)?c\s[^>]*?)\s+t="n"(\s*/>|></(?:\w+:)?c>)')
 # IronCalc 0.9.1 cannot load the comments that openpyxl writes; no formula needs them.
@@ -39,6 +43,8 @@ WORKSHEET = re.compile(r"xl/worksheets/[^/]+\.xml")
 def strip_values(path: str | Path, copy: str | Path, changes: Changes | None = None) -> None:
     """Copy a workbook without the stored values of its formulas, and with ``changes`` put in.
 
+    The copy has no number formats either, so that nobody takes a number for a date.
+
     Raises
     ------
     WorkbookError
@@ -49,7 +55,7 @@ def strip_values(path: str | Path, copy: str | Path, changes: Changes | None = N
         numbers = {parts[sheet]: cells for sheet, cells in (changes or {}).items()}
 
         def rewritten(name: str, xml: bytes) -> bytes:
-            xml = _without_values(xml)
+            xml = STYLE.sub(rb"\1", _without_values(xml))
             return _with_numbers(xml, numbers[name]) if name in numbers else xml
 
         _copy(old, copy, rewritten)
@@ -77,15 +83,22 @@ def copy_for_ironcalc(path: str | Path, copy: str | Path) -> None:
 
 def _copy(old: zipfile.ZipFile, copy: str | Path, rewritten: Callable[[str, bytes], bytes]) -> None:
     """Copy a workbook without comments, its worksheets rewritten."""
-    with zipfile.ZipFile(copy, "w") as new:
+    content = BytesIO()
+    with zipfile.ZipFile(content, "w") as new:
         for item in old.infolist():
-            content = old.read(item)
+            part = old.read(item)
             if WORKSHEET.fullmatch(item.filename):
-                content = DRAWING.sub(b"", rewritten(item.filename, content))
-                content = EMPTY.sub(rb"\1\2", content) if b't="n"' in content else content
+                part = DRAWING.sub(b"", rewritten(item.filename, part))
+                part = EMPTY.sub(rb"\1\2", part) if b't="n"' in part else part
             elif item.filename.startswith("xl/worksheets/_rels/"):
-                content = COMMENTS.sub(b"", content)
-            new.writestr(item.filename, content)
+                part = COMMENTS.sub(b"", part)
+            new.writestr(item.filename, part)
+    try:
+        Path(copy).write_bytes(content.getbuffer())
+    except OSError as error:
+        folder = Path(copy).parent
+        words = f"a copy of the workbook cannot be written to {folder}: {error.strerror or error}"
+        raise EngineError(f"{words}; make room there, or set TMPDIR") from None
 
 
 def _without_values(xml: bytes) -> bytes:
@@ -101,6 +114,8 @@ def _without_values(xml: bytes) -> bytes:
 def _with_numbers(xml: bytes, numbers: dict[tuple[int, int], float | None]) -> bytes:
     from openpyxl.utils import get_column_letter  # costly, and IronCalc takes no numbers this way
 
+    if odd := [v for v in numbers.values() if v is not None and not isfinite(v)]:
+        raise EngineError(f"a cell cannot hold the number {odd[0]}")
     new = {f"{get_column_letter(c)}{r}".encode(): v for (r, c), v in numbers.items()}
 
     def cell(match: re.Match[bytes]) -> bytes:
