@@ -63,6 +63,10 @@ class Apart:
 
     def ask(self, changes: Changes | None = None) -> None:
         """Begin to calculate, with numbers put in first."""
+        self._ask(changes)
+
+    def _ask(self, changes: Changes | None) -> int:
+        """The number of a question, asked if it is not yet."""
         question = _question(changes)
         if question not in self._asked:
             number = next(self._numbers)
@@ -70,11 +74,11 @@ class Apart:
             self._asked[question] = number
             with suppress(OSError):  # it has ended; the answer will say so
                 _tell(self._process.stdin, number)
+        return self._asked[question]
 
     def values(self, changes: Changes | None = None) -> Values:
         """Values of all cells that are not empty; what was asked for in vain is passed over."""
-        self.ask(changes)
-        number = self._asked[_question(changes)]
+        number = self._ask(changes)
         while self._answered < number:
             self._answered = self._next()
         self._asked = {question: n for question, n in self._asked.items() if n > number}
@@ -169,7 +173,7 @@ class _Service:
             try:
                 self._load()
             except KfsheetError as error:
-                self._put(number, (type(error).__name__, str(error)))
+                self._refuse(number, error)
                 _tell(self._pipe, number)
                 continue
             if not self._fork(number, changes):
@@ -224,9 +228,12 @@ class _Service:
         try:
             cells, values = self._engine.calculated(changes)
         except KfsheetError as error:
-            self._put(number, (type(error).__name__, str(error)))
+            self._refuse(number, error)
         else:
             self._put(number, (VALUES, None if cells is self._cells else cells, values))
+
+    def _refuse(self, number: int, error: KfsheetError) -> None:
+        self._put(number, (type(error).__name__, str(error)))
 
     def _put(self, number: int, answer: tuple) -> None:
         self._desk.put(f"answer {number}", marshal.dumps(answer))
