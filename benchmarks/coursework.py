@@ -9,11 +9,11 @@ from pathlib import Path
 from measuring import Line, seconds
 
 from kfsheet import load_exercise
-from kfsheet.coursework.assessing import assess
-from kfsheet.coursework.grading import grade
-from kfsheet.coursework.handout import handout_bytes, solution_bytes
-from kfsheet.coursework.roster import Student
-from kfsheet.coursework.variation import own_numbers
+from kfsheet.coursework.handout.handouts import handout_bytes, solution_bytes
+from kfsheet.coursework.handout.roster import Student
+from kfsheet.coursework.handout.variation import own_numbers
+from kfsheet.coursework.reports.assessing import assess
+from kfsheet.coursework.reports.grading import grade
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import students as do

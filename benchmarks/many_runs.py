@@ -10,7 +10,7 @@ from measuring import Line, in_turn, peak_memory, seconds
 from one_run import AXIS, Axis
 
 import kfsheet as kf
-from kfsheet.compiling import can_compile
+from kfsheet.evaluation.compiling import can_compile
 from kfsheet.exercises.cannonball import cannonball
 from kfsheet.exercises.football import football
 from kfsheet.exercises.shuttlecock import shuttlecock

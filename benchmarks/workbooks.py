@@ -13,11 +13,11 @@ import openpyxl
 from measuring import Line, in_turn, seconds
 
 import kfsheet as kf
-from kfsheet.excel.recalculate import convert, libreoffice, recalculate
-from kfsheet.excel.stripping import strip_values
-from kfsheet.excel.workbook import workbook_bytes
 from kfsheet.exercises.cannonball import exercise as cannonball
 from kfsheet.exercises.football import exercise as football
+from kfsheet.workbook.engines.copies import strip_values
+from kfsheet.workbook.engines.recalculate import convert, libreoffice, recalculate
+from kfsheet.workbook.write.workbook import workbook_bytes
 
 HERE = Path(__file__).parent
 

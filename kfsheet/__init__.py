@@ -12,29 +12,29 @@ from typing import Any
 __version__ = "0.1.0"
 
 _HOMES = {
-    "kfsheet.algebra": "analysis correlated_covariance diagonal_analysis discrete_noise "
+    "kfsheet.estimation.algebra": "analysis correlated_covariance diagonal_analysis discrete_noise "
     "gain_limits sequential_gain transition_matrix transition_matrix_laplace",
-    "kfsheet.charts": "Chart Series",
-    "kfsheet.ensemble": "Draws NEES Study",
+    "kfsheet.model.chart": "Chart Series",
+    "kfsheet.ensemble.draws": "Draws NEES Study",
     "kfsheet.errors": "DataError EngineError KfsheetError ModelError PrintError WorkbookError",
-    "kfsheet.evaluation": "evaluate warm_up",
-    "kfsheet.excel.check": "check_workbook",
-    "kfsheet.excel.printer": "excel_code",
-    "kfsheet.excel.recalculate": "recalculate",
-    "kfsheet.excel.workbook": "write_workbook",
-    "kfsheet.exercise": "Exercise Question",
+    "kfsheet.evaluation.evaluate": "evaluate warm_up",
+    "kfsheet.workbook.check.check": "check_workbook",
+    "kfsheet.printing.excel": "excel_code",
+    "kfsheet.workbook.engines.recalculate": "recalculate",
+    "kfsheet.workbook.write.workbook": "write_workbook",
+    "kfsheet.model.exercise": "Exercise Question",
     "kfsheet.exercises": "exercise_names load_exercise",
-    "kfsheet.expressions": "Count Largest Last Mean Missing Observed RMS Smallest Std Sum "
+    "kfsheet.model.expressions": "Count Largest Last Mean Missing Observed RMS Smallest Std Sum "
     "SumProduct t when_observed",
-    "kfsheet.fitting": "least_squares newton_step normal_equations",
-    "kfsheet.kalman": "Intermediate Observation State StateSpace add_filter",
-    "kfsheet.latex": "latex_code",
-    "kfsheet.plots": "draw",
-    "kfsheet.pythoncode": "python_code",
-    "kfsheet.recurrence": "Recurrence",
-    "kfsheet.show": "formula_table",
-    "kfsheet.source": "python_source",
-    "kfsheet.tables": "read_table",
+    "kfsheet.estimation.least_squares": "least_squares newton_step normal_equations",
+    "kfsheet.estimation.kalman": "Intermediate Observation State StateSpace add_filter",
+    "kfsheet.printing.latex": "latex_code",
+    "kfsheet.evaluation.plots": "draw",
+    "kfsheet.printing.python": "python_code",
+    "kfsheet.model.recurrence": "Recurrence",
+    "kfsheet.cli.show": "formula_table",
+    "kfsheet.evaluation.python_source": "python_source",
+    "kfsheet.model.tables": "read_table",
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names.split()}
 __all__ = sorted([*_HOME, "__version__"])

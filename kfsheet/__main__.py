@@ -3,7 +3,7 @@
 import gc
 import sys
 
-from kfsheet.cli import main
+from kfsheet.cli.commands import main
 
 
 def program() -> int:

@@ -28,10 +28,10 @@ from sympy import Eq, Function, LambertW, Matrix, dsolve, exp, init_printing, so
 import kfsheet as kf
 
 # %%
-from kfsheet import drag
+from kfsheet.estimation import drag
 from kfsheet.exercises.shuttlecock import FORECASTS, exercise, shuttlecock
-from kfsheet.shuttlecock.filters import joint_model
-from kfsheet.shuttlecock.outliers import struck_frames, with_outliers
+from kfsheet.exercises.shuttlecock.filters import joint_model
+from kfsheet.exercises.shuttlecock.outliers import struck_frames, with_outliers
 
 init_printing(use_latex="mathjax", latex_printer=lambda e, **_: kf.latex_code(e))
 CHARTS = {chart.title: chart for chart in exercise.charts}
@@ -763,8 +763,8 @@ pd.DataFrame({(w, D): share(f) for w, runs in worlds.items() for D, f in runs.it
 #
 # Cameras sometimes take something else for the shuttlecock. One frame of ten now gets a second
 # error on each axis, normal with eight times the standard deviation, from
-# `kfsheet.shuttlecock.outliers`. The exact filter flies without doubt, and with a gate: it ignores
-# innovations beyond eight, or three, of the standard deviations that it expects.
+# `kfsheet.exercises.shuttlecock.outliers`. The exact filter flies without doubt, and with a gate:
+# it ignores innovations beyond eight, or three, of the standard deviations that it expects.
 
 
 # %%

@@ -24,9 +24,23 @@ from sympy import Symbol, cos, init_printing, pi, simplify, sin, solve, symbols
 
 import kfsheet as kf
 from kfsheet.exercises.tennis import build_model, exercise, read_drive, read_toss, tennis
-from kfsheet.tennis import calibration, cameras, centroid, loop, reprojection, shots, symbolic
-from kfsheet.tennis.closed_form import closed_form
-from kfsheet.tennis.dynamics import MASS, TEXTBOOK_DRAG, Ball, impact, nine_quantities
+from kfsheet.exercises.tennis.methods import (
+    calibration,
+    cameras,
+    centroid,
+    loop,
+    reprojection,
+    shots,
+    symbolic,
+)
+from kfsheet.exercises.tennis.methods.closed_form import closed_form
+from kfsheet.exercises.tennis.methods.dynamics import (
+    MASS,
+    TEXTBOOK_DRAG,
+    Ball,
+    impact,
+    nine_quantities,
+)
 
 # %%
 init_printing(use_latex="mathjax", latex_printer=lambda e, **_: kf.latex_code(e))

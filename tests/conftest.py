@@ -9,9 +9,9 @@ import matplotlib
 import pytest
 from hypothesis import settings
 
-from kfsheet.excel.recalculate import ENGINES, libreoffice
-from kfsheet.excel.workbook import write_workbook
 from kfsheet.exercises.football import exercise
+from kfsheet.workbook.engines.recalculate import ENGINES, libreoffice
+from kfsheet.workbook.write.workbook import write_workbook
 
 matplotlib.use("Agg")
 # Compiled models of one test run, shared by its workers and forgotten with the temporary files.

@@ -8,7 +8,10 @@ import random
 from collections import Counter
 
 import mpmath
+import openpyxl
 import sympy as sp
+
+from kfsheet.workbook.engines.recalculate import recalculate
 
 VARIABLES = sp.symbols("x y z", real=True)
 FUNCTIONS = (
@@ -169,3 +172,16 @@ def truth(e, at):
     if e.is_Relational:
         return e.func(*(sp.Float(value(a, at), DIGITS) for a in e.args)) == True  # noqa: E712
     return bool(e)
+
+
+def calculate(formulas, engine, path, inputs=()):
+    """Values of formulas in column D, beside their inputs in A to C."""
+    book = openpyxl.Workbook()
+    for row, formula in enumerate(formulas, 1):
+        for column, number in enumerate(inputs[row - 1] if inputs else (), 1):
+            book.active.cell(row, column, number)
+        book.active.cell(row, 4, formula)
+    book.active["F1"] = 3
+    book.save(path)
+    values = recalculate(path, engine)[book.active.title]
+    return [values.get((row, 4)) for row in range(1, len(formulas) + 1)]

@@ -9,12 +9,12 @@ import re
 import openpyxl
 from openpyxl.utils import column_index_from_string, get_column_letter
 
-from kfsheet.coursework.handout import handout_bytes, own_run
-from kfsheet.coursework.judge import asked_steps
-from kfsheet.coursework.roster import Student
-from kfsheet.coursework.variation import own_numbers
-from kfsheet.excel.layout import FIRST_ROW, Layout
-from kfsheet.expressions import Missing
+from kfsheet.coursework.handout.handouts import handout_bytes, own_run
+from kfsheet.coursework.handout.roster import Student
+from kfsheet.coursework.handout.variation import own_numbers
+from kfsheet.coursework.judging.judge import asked_steps
+from kfsheet.model.expressions import Missing
+from kfsheet.workbook.write.layout import FIRST_ROW, Layout
 
 SECRET = b"the secret of the tests, 32 byte"
 ADA = Student("s001", "Ada Lovelace", "ada@example.org")

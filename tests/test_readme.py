@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from kfsheet.cli import main
+from kfsheet.cli.commands import main
 
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 WALK, MANY = re.findall(r"```python\n(.*?)```", README, re.DOTALL)

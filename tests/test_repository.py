@@ -10,9 +10,9 @@ import pytest
 from conftest import MACHINE_PATH, without_images
 
 from kfsheet import load_exercise
-from kfsheet.cli import parser
-from kfsheet.excel.workbook import workbook_bytes
+from kfsheet.cli.commands import parser
 from kfsheet.exercises import exercise_names
+from kfsheet.workbook.write.workbook import workbook_bytes
 
 ROOT = Path(__file__).parents[1]
 REGISTRY = r"pypi\.org|files\.pythonhosted"

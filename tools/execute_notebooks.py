@@ -15,8 +15,8 @@ import jupytext
 import nbformat
 from nbclient import NotebookClient
 
+from kfsheet.cli.terminal import progress
 from kfsheet.files import write_file
-from kfsheet.terminal import progress
 
 FOLDER = Path(__file__).parents[1] / "notebooks"
 KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}

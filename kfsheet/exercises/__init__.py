@@ -10,19 +10,20 @@ import traceback
 from pathlib import Path
 
 from kfsheet.errors import KfsheetError, ModelError
-from kfsheet.exercise import Exercise
+from kfsheet.model.exercise import Exercise
 
 
 def exercise_names() -> list[str]:
     """Names of the exercises that come with kfsheet; a leading underscore marks a part of one."""
-    names = (module.name for module in pkgutil.iter_modules(__path__))
+    names = (module.name for module in pkgutil.iter_modules(__path__) if module.ispkg)
     return sorted(name for name in names if not name.startswith("_"))
 
 
 def load_exercise(spec: str) -> Exercise:
     """The exercise called ``spec``, or the one in the Python file at that path.
 
-    A file defines the name ``exercise``, an :class:`~kfsheet.exercise.Exercise`; ours do the same.
+    A file defines the name ``exercise``, an :class:`~kfsheet.model.exercise.Exercise`; ours do the
+    same.
 
     Raises
     ------

@@ -1,0 +1,199 @@
+"""The command line: ``kfsheet build | check | show | handout | grade``."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
+
+from kfsheet import __version__
+from kfsheet.cli.coursework_commands import add_commands
+from kfsheet.cli.terminal import DOES_NOT_HOLD, HOLDS, WRONG_USE, complain, progress
+from kfsheet.errors import KfsheetError, ModelError, WorkbookError
+
+if TYPE_CHECKING:
+    from kfsheet.model.exercise import Exercise
+    from kfsheet.workbook.check.check import Report
+
+MOST_LINES = 20
+ENGINE_NAMES = {"ironcalc": "IronCalc", "libreoffice": "LibreOffice"}
+
+
+class Parser(argparse.ArgumentParser):
+    """Tells a wrong call in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print one line and leave with status 2."""
+        self.exit(WRONG_USE, f"{self.prog}: {message}; see {self.prog} --help\n")
+
+
+def parser() -> Parser:
+    """The arguments of every command."""
+    top = Parser(
+        prog="kfsheet",
+        description="Kalman filters derived once, and written as workbooks of live formulas.",
+    )
+    top.add_argument("--version", action="version", version=f"kfsheet {__version__}")
+    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    exercise = "name of an exercise, or the path of a Python file that defines one"
+
+    build = commands.add_parser("build", help="write workbooks")
+    build.add_argument(
+        "exercises", nargs="*", metavar="EXERCISE", help=f"{exercise} (default: all)"
+    )
+    build.add_argument(
+        "--out", default="workbooks", metavar="DIR", help="folder (default: workbooks)"
+    )
+    build.add_argument(
+        "--force", action="store_true", help="also replace a workbook that was changed"
+    )
+    build.set_defaults(run=run_build)
+
+    check = commands.add_parser(
+        "check", help="recalculate workbooks from nothing and compare them with NumPy"
+    )
+    check.add_argument("workbooks", nargs="+", metavar="WORKBOOK", help="an .xlsx file")
+    check.add_argument(
+        "--engine",
+        choices=list(ENGINE_NAMES),
+        default="ironcalc",
+        help="who recalculates (default: ironcalc, which is built in)",
+    )
+    check.add_argument(
+        "--exercise",
+        metavar="FILE.py",
+        help="the file that defines the exercise, for workbooks of your own",
+    )
+    check.set_defaults(run=run_check)
+
+    show = commands.add_parser("show", help="print a model in another dress")
+    show.add_argument("exercise", metavar="EXERCISE", help=exercise)
+    show.add_argument(
+        "--as",
+        dest="dress",
+        choices=["python", "latex", "excel", "table"],
+        default="table",
+        help="Python source, LaTeX, Excel formulas, or a table of numbers (default)",
+    )
+    show.set_defaults(run=run_show)
+    add_commands(commands, exercise)
+    return top
+
+
+def run_build(arguments: argparse.Namespace) -> int:
+    """Write workbooks."""
+    from kfsheet.exercises import exercise_names, load_exercise
+    from kfsheet.workbook.write.workbook import write_workbook
+
+    specs = dict.fromkeys(arguments.exercises or exercise_names())
+    exercises = [load_exercise(spec) for spec in specs]
+    if Path(arguments.out).suffix == ".xlsx":
+        raise WorkbookError(f"--out {arguments.out} is a file name; give a folder")
+    written = []
+    for exercise in progress(exercises, "build", len(exercises), lambda e: e.name):
+        written.append(write_workbook(exercise, Path(arguments.out), force=arguments.force))
+    for spec, exercise in zip(specs, exercises, strict=True):
+        if spec not in exercise_names():  # ours keep the misprints of their sources, on switches
+            _warn_of_units(exercise)
+    for path in written:
+        print(path)
+    return HOLDS
+
+
+def _warn_of_units(exercise: Exercise) -> None:
+    for problem in exercise.model.check_units():
+        print(f"kfsheet: warning: {exercise.name}, units of {problem}", file=sys.stderr)
+
+
+def run_check(arguments: argparse.Namespace) -> int:
+    """Check workbooks; one that cannot be checked does not keep the others from it."""
+    status = HOLDS
+    for path in progress(arguments.workbooks, "check", len(arguments.workbooks)):
+        try:
+            status = max(status, _check_one(Path(path), arguments))
+        except KfsheetError as error:
+            complain(error)
+            status = WRONG_USE
+    return status
+
+
+def _check_one(path: Path, arguments: argparse.Namespace) -> int:
+    from kfsheet.workbook.engines.ironcalc_process import Apart
+
+    asked = Apart(path) if arguments.engine == "ironcalc" else None
+    if asked:
+        asked.ask()  # it works while SymPy is imported
+    from kfsheet.exercises import exercise_names, load_exercise
+    from kfsheet.workbook.check.check import check
+    from kfsheet.workbook.check.opened import Opened
+    from kfsheet.workbook.check.trials import foreseen
+
+    book = Opened(path, arguments.engine, asked)
+    given = arguments.exercise
+    likely = given or book.exercise_hint
+    # Both take time, in which the engine works.
+    exercise = load_exercise(likely) if given or likely in exercise_names() else None
+    ahead = foreseen(book, exercise) if exercise else None
+    name = book.exercise_name()
+    if not given and name not in exercise_names():
+        raise ModelError(
+            f"{path} was built from {name!r}, which is not one of ours; "
+            f"name its file: kfsheet check {path} --exercise {name}.py"
+        )
+    if exercise is None or (exercise.name != name and not given):
+        exercise, ahead = load_exercise(name), None
+    if exercise.name != name:
+        raise ModelError(f"{path} was built from {name!r}, not from {exercise.name!r}")
+    report = check(book, exercise, ahead or foreseen(book, exercise))
+    for change in report.changed:
+        print(f"{path}: changed: {change}")
+    lines = report.lines()
+    for line in lines[:MOST_LINES]:
+        print(f"{path}: {line}")
+    if len(lines) > MOST_LINES:
+        print(f"{path}: ... and {len(lines) - MOST_LINES} more lines like these")
+    print(f"{path}: {_verdict(report)}")
+    return HOLDS if report.holds else DOES_NOT_HOLD
+
+
+def _verdict(report: Report) -> str:
+    engine = ENGINE_NAMES[report.engine]
+    if report.holds:
+        return (
+            f"{report.cells} formulas agree with NumPy in {engine} "
+            f"(largest relative difference {report.largest:.1e})"
+        )
+    wrong = len(report.problems)
+    cells = f"{wrong} cell{'s are' if wrong > 1 else ' is'} wrong in {engine}"
+    return cells + (f", {report.followers} more follow from that" if report.followers else "")
+
+
+def run_show(arguments: argparse.Namespace) -> int:
+    """Print a model."""
+    from kfsheet.cli.show import DRESSES
+    from kfsheet.exercises import load_exercise
+
+    print(DRESSES[arguments.dress](load_exercise(arguments.exercise).model))
+    return HOLDS
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command line and return the exit status: 0, 1 "it does not hold", 2 wrong use."""
+    try:
+        chosen = parser().parse_args(arguments)
+        return chosen.run(chosen)
+    except KfsheetError as error:
+        complain(error)
+    except KeyboardInterrupt:
+        complain(RuntimeError("interrupted; nothing half-written was left"))
+    except BrokenPipeError:
+        # The reader of our output has gone, as `head` does; nothing is left to say.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return HOLDS
+    except Exception as error:  # a defect of ours: one line, and the traceback on request
+        if os.environ.get("KFSHEET_DEBUG"):
+            raise
+        complain(RuntimeError(f"{type(error).__name__}: {error}; set KFSHEET_DEBUG=1 for more"))
+    return WRONG_USE

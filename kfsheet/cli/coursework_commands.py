@@ -1,0 +1,151 @@
+"""The commands of coursework: ``kfsheet handout | grade``."""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from kfsheet.cli.terminal import DOES_NOT_HOLD, HOLDS, complain, progress
+from kfsheet.errors import DataError
+
+if TYPE_CHECKING:
+    from kfsheet.coursework.reports.assessing import Assessment
+
+
+def add_commands(commands: argparse._SubParsersAction, exercise: str) -> None:
+    """Add the commands to those that there are; ``exercise`` says what an exercise is."""
+    handout = commands.add_parser("handout", help="make every student's own assignment")
+    grade = commands.add_parser("grade", help="grade what comes back")
+    for command in (handout, grade):
+        command.add_argument("exercise", metavar="EXERCISE", help=exercise)
+    grade.add_argument("submissions", metavar="SUBMISSIONS", help="folder of what came back")
+    for command in (handout, grade):
+        command.add_argument(
+            "--roster", required=True, metavar="FILE.csv", help="students: id,name[,email]"
+        )
+        command.add_argument(
+            "--secret",
+            metavar="FILE",
+            help="the secret of the course (default: kfsheet.secret beside the roster)",
+        )
+        command.add_argument("--out", required=True, metavar="DIR", help="folder for the results")
+        command.add_argument(
+            "--jobs", type=_count, default=1, metavar="N", help="processes (default: 1)"
+        )
+    handout.add_argument(
+        "--notebook", action="store_true", help="also write an assignment for nbgrader"
+    )
+    handout.add_argument(
+        "--force", action="store_true", help="also replace handouts that would become others"
+    )
+    handout.set_defaults(run=run_handout)
+    grade.set_defaults(run=run_grade)
+
+
+def _count(text: str) -> int:
+    if not text.isdigit() or not 1 <= int(text) <= 256:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number from 1 to 256")
+    return int(text)
+
+
+def _secret_path(arguments: argparse.Namespace) -> Path:
+    return Path(arguments.secret or Path(arguments.roster).parent / "kfsheet.secret")
+
+
+def _secret_of_handouts(arguments: argparse.Namespace) -> bytes:
+    """The secret, which is made where nothing was handed out yet."""
+    from kfsheet.coursework.handout.handouts import holds_handouts
+    from kfsheet.coursework.handout.tokens import read_secret
+
+    path = _secret_path(arguments)
+    if path.exists():
+        return read_secret(path)
+    if holds_handouts(arguments.out):
+        raise DataError(
+            f"{arguments.out} holds handouts, and there is no secret {path}; give theirs with "
+            "--secret: a new one could not grade them (to begin anew, choose another --out)"
+        )
+    secret = read_secret(path, make=True)
+    print(f"made the secret of the course: {path}; keep it, and to yourself")
+    return secret
+
+
+def run_handout(arguments: argparse.Namespace) -> int:
+    """Write a workbook for every student, and its solution."""
+    from kfsheet.coursework.handout.handouts import write_handouts
+    from kfsheet.coursework.handout.roster import read_roster
+    from kfsheet.exercises import load_exercise
+
+    exercise = load_exercise(arguments.exercise)
+    students = read_roster(arguments.roster)
+    made = write_handouts(
+        exercise,
+        arguments.exercise,
+        students,
+        _secret_of_handouts(arguments),
+        arguments.out,
+        jobs=arguments.jobs,
+        force=arguments.force,
+    )
+    for _ in progress(made, "handout", len(students), lambda path: path.parent.name):
+        pass
+    print(f"{len(students)} workbooks in {Path(arguments.out) / 'students'}")
+    print(f"their solutions in {Path(arguments.out) / 'solutions'}; do not hand these out")
+    if arguments.notebook:
+        from kfsheet.coursework.handout.nbgrader import write_assignment
+
+        print(write_assignment(exercise, arguments.out))
+    return HOLDS
+
+
+def run_grade(arguments: argparse.Namespace) -> int:
+    """Grade a folder of submissions; a bad file is a status in the table, not an error."""
+    from kfsheet.coursework.handout.roster import read_roster
+    from kfsheet.coursework.handout.tokens import read_secret
+    from kfsheet.coursework.reading.belonging import belongs_to, claim
+    from kfsheet.coursework.reading.collecting import passed_over
+    from kfsheet.coursework.reports.assessing import NO_TOKEN
+    from kfsheet.coursework.reports.grading import grade, override
+    from kfsheet.coursework.reports.overrides import read_overrides, with_all_marks
+    from kfsheet.coursework.reports.reports import write_reports
+    from kfsheet.exercises import load_exercise
+
+    exercise = load_exercise(arguments.exercise)
+    students = read_roster(arguments.roster)
+    out = Path(arguments.out)
+    if not claim(out, "graded", exercise.name):
+        other = belongs_to(out, "graded")
+        raise DataError(f"{out} holds the results of {other}; give another --out")
+    lines = read_overrides(out / "overrides.csv", exercise, {s.id for s in students})
+    results, handed = grade(
+        exercise,
+        arguments.exercise,
+        arguments.submissions,
+        students,
+        read_secret(_secret_path(arguments)),
+        out,
+        jobs=arguments.jobs,
+        progress=lambda items, count: progress(items, "grade", count, _judged),
+    )
+    results = override([with_all_marks(r, exercise) for r in results], iter(lines))
+    for path in write_reports(exercise, results, handed, out):
+        print(path)
+    statuses = Counter(result.status for result in results)
+    print("; ".join(f"{status}: {count}" for status, count in statuses.most_common()))
+    if lost := sum(file.of_nobody for file in handed):
+        print(f"files that belong to nobody: {lost}; see the end of {out / 'class.html'}")
+    if skipped := [path.name for path in passed_over(arguments.submissions, out)]:
+        print(f"files passed over: {len(skipped)} ({', '.join(skipped[:5])})")
+    found = [file.assessment for file in handed]
+    if any(a.status == NO_TOKEN for a in found) and not any(a.student for a in found):
+        complain(DataError("no file carries a token of this course; is --secret the right file?"))
+        return DOES_NOT_HOLD
+    return HOLDS
+
+
+def _judged(item: tuple[Path, Assessment]) -> str:
+    """Whose file it was, or what it is called, and what came of it."""
+    path, found = item
+    return f"{found.student or path.name}, {found.status}"

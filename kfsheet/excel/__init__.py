@@ -1,1 +1,0 @@
-"""Workbooks: written, recalculated by others, checked."""

@@ -1,0 +1,161 @@
+"""An exercise bundles what belongs together: model, charts, questions, words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from kfsheet.errors import ModelError
+from kfsheet.model.chart import Chart
+from kfsheet.model.recurrence import Recurrence
+
+if TYPE_CHECKING:
+    from numpy.random import RandomState
+
+Draw = Callable[["RandomState", Mapping[str, float]], Mapping[str, list[float]]]
+"""Draws data columns by name, from a generator and the values of all parameters."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """A column or derived scalar that students fill in.
+
+    Parameters
+    ----------
+    name : str
+        Of the column or the derived scalar.
+    points : int
+        What it is worth: 1, 2, 3, ...
+    hint : str
+        A sentence that helps to begin.
+    """
+
+    name: str
+    points: int
+    hint: str
+
+
+@dataclass(frozen=True)
+class Exercise:
+    """A model with all that a workbook, a notebook and a coursework need beside it.
+
+    Parameters
+    ----------
+    model : Recurrence
+        The filter; its name is the name of the exercise and of its workbook.
+    about : tuple of str
+        Paragraphs for the sheet "Read me": the story, and what to try.
+    source : str
+        Where the exercise comes from.
+    charts : tuple of Chart
+        In the order in which they appear.
+    questions : tuple of Question
+        What coursework asks for.
+    notebook : str
+        File name of the notebook that walks through it, if there is one.
+    sections : dict
+        What each worksheet holds, by its name.
+    greyed : str
+        A column that is 0 in rows that no longer count; they are shown in grey.
+    alarm : tuple of str
+        Summaries that are 0 if results are not what they seem; such a one is then red.
+    vary : dict
+        Parameters that differ from student to student: lowest and highest value by name.
+    noise : tuple of str
+        Data columns that hold standard-normal draws; every student gets other ones.
+    frozen : tuple of str
+        Worksheets whose formulas would give answers away; handouts hold their values only.
+    task : tuple of str
+        What a student must know to answer the questions, such as the model's equations in words.
+    veiled : tuple of str
+        Columns and derived scalars that stay live in handouts, but hide their formulas: they repeat
+        an answer's, or a part of it.
+    sealed : tuple of str
+        Worksheets whose given formulas stay live in handouts, but are hidden: they look like an
+        answer's, for another axis or camera. An answer may read them.
+    draw : function of (generator, parameters), optional
+        Draws other data columns anew, as lists by name; None in a list is a missing value.
+
+    Raises
+    ------
+    ModelError
+        If the model is not complete, or a chart or a question names what is not there.
+    """
+
+    model: Recurrence
+    about: tuple[str, ...]
+    source: str
+    charts: tuple[Chart, ...] = ()
+    questions: tuple[Question, ...] = ()
+    notebook: str = ""
+    sections: dict[str, str] = field(default_factory=dict)
+    greyed: str = ""
+    alarm: tuple[str, ...] = ()
+    vary: dict[str, tuple[float, float]] = field(default_factory=dict)
+    noise: tuple[str, ...] = ()
+    frozen: tuple[str, ...] = ()
+    task: tuple[str, ...] = ()
+    veiled: tuple[str, ...] = ()
+    sealed: tuple[str, ...] = ()
+    draw: Draw | None = None
+
+    def __post_init__(self) -> None:
+        for name, kind in (
+            ("about", str),
+            ("task", str),
+            ("alarm", str),
+            ("charts", Chart),
+            ("questions", Question),
+        ):
+            given = getattr(self, name)
+            if not isinstance(given, tuple) or not all(isinstance(item, kind) for item in given):
+                raise ModelError(
+                    f"{self.name}: {name} is {given!r:.60}; give a tuple of {kind.__name__}, "
+                    "with a comma even after a single one"
+                )
+        self.model.validate()
+        for chart in self.charts:
+            chart.check(self.model)
+        for question in self.questions:
+            self._check_question(question)
+        if self.greyed:
+            self.model.column(self.greyed)
+        for name in set(self.alarm) - set(self.model.summaries):
+            raise ModelError(f"{self.name}: alarm names {name}, which is no summary")
+        if unknown := {*self.sections, *self.frozen, *self.sealed} - set(self.model.sections):
+            raise ModelError(f"{self.name} has no section {unknown.pop()!r}")
+        for name in set(self.veiled) - set(self.model.derived_scalars):
+            self.model.column(name)
+        self._check_variation()
+
+    def _check_variation(self) -> None:
+        for name, limits in self.vary.items():
+            if name not in self.model.parameters:
+                raise ModelError(f"{self.name}: vary names {name}, which is no parameter")
+            low, high = (self.model.parameters[name].checked(limit) for limit in limits)
+            if not low < high:
+                raise ModelError(f"{self.name}: vary {name} needs a lower and a higher value")
+        for name in self.noise:
+            if not self.model.column(name).is_data:
+                raise ModelError(f"{self.name}: noise names {name}, which is no data column")
+
+    def _check_question(self, question: Question) -> None:
+        if not isinstance(question.points, int) or question.points <= 0:
+            raise ModelError(
+                f"question {question.name} has {question.points!r} points; give 1, 2, 3, ..."
+            )
+        if question.name in self.model.derived_scalars:
+            return
+        if self.model.column(question.name).is_data:
+            raise ModelError(f"question {question.name}: the column is data, not a formula")
+
+    @property
+    def name(self) -> str:
+        """Identifier: on the command line, and of the workbook."""
+        return self.model.name
+
+    @property
+    def title(self) -> str:
+        """One line for people."""
+        return self.model.title
