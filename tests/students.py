@@ -10,9 +10,9 @@ import openpyxl
 from openpyxl.utils import column_index_from_string, get_column_letter
 
 from kfsheet.coursework.handout.handouts import handout_bytes, own_run
-from kfsheet.coursework.handout.roster import Student
 from kfsheet.coursework.handout.variation import own_numbers
 from kfsheet.coursework.judging.judge import asked_steps
+from kfsheet.coursework.reading.roster import Student
 from kfsheet.model.expressions import Missing
 from kfsheet.workbook.write.layout import FIRST_ROW, Layout
 

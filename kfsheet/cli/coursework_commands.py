@@ -75,7 +75,7 @@ def _secret_of_handouts(arguments: argparse.Namespace) -> bytes:
 def run_handout(arguments: argparse.Namespace) -> int:
     """Write a workbook for every student, and its solution."""
     from kfsheet.coursework.handout.handouts import write_handouts
-    from kfsheet.coursework.handout.roster import read_roster
+    from kfsheet.coursework.reading.roster import read_roster
     from kfsheet.exercises import load_exercise
 
     exercise = load_exercise(arguments.exercise)
@@ -102,10 +102,10 @@ def run_handout(arguments: argparse.Namespace) -> int:
 
 def run_grade(arguments: argparse.Namespace) -> int:
     """Grade a folder of submissions; a bad file is a status in the table, not an error."""
-    from kfsheet.coursework.handout.roster import read_roster
     from kfsheet.coursework.handout.tokens import read_secret
     from kfsheet.coursework.reading.belonging import belongs_to, claim
     from kfsheet.coursework.reading.collecting import passed_over
+    from kfsheet.coursework.reading.roster import read_roster
     from kfsheet.coursework.reports.assessing import NO_TOKEN
     from kfsheet.coursework.reports.grading import grade, override
     from kfsheet.coursework.reports.overrides import read_overrides, with_all_marks

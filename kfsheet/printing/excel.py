@@ -14,7 +14,6 @@ from openpyxl.utils import FORMULAE
 from sympy import Basic, Expr, Indexed, Symbol
 
 from kfsheet.errors import PrintError
-from kfsheet.model.expressions import Aggregate
 from kfsheet.printing.excel_names import excel_name_problem
 from kfsheet.printing.formula_printer import FormulaPrinter
 
@@ -132,7 +131,7 @@ class ExcelPrinter(FormulaPrinter):
     def _print_BooleanAtom(self, expr: Basic) -> str:
         return "TRUE" if expr else "FALSE"
 
-    def _print_Aggregate(self, expr: Aggregate) -> str:
+    def _print_Aggregate(self, expr: Expr) -> str:
         name = type(expr).__name__
         if name == "Last":
             return self._print_Indexed(expr)

@@ -6,7 +6,6 @@ from sympy import Basic, Expr, Indexed, Piecewise, Symbol
 from sympy.printing.precedence import PRECEDENCE
 
 from kfsheet.errors import PrintError
-from kfsheet.model.expressions import Aggregate
 from kfsheet.printing.formula_printer import FormulaPrinter
 
 
@@ -50,7 +49,7 @@ class PythonPrinter(FormulaPrinter):
     def _print_Observed(self, expr: Basic) -> str:
         return self._call("observed", *expr.args)
 
-    def _print_Aggregate(self, expr: Aggregate) -> str:
+    def _print_Aggregate(self, expr: Expr) -> str:
         name = type(expr).__name__.lower()
         return self._call("total" if name == "sum" else name, *expr.args)
 

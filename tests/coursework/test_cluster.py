@@ -9,8 +9,8 @@ import pytest
 import students as do
 
 from kfsheet import Draws, evaluate
-from kfsheet.coursework.handout.roster import Student
 from kfsheet.coursework.judging.workers import run_on
+from kfsheet.coursework.reading.roster import Student
 from kfsheet.coursework.reports.grading import grade
 from kfsheet.errors import EngineError
 from kfsheet.evaluation.compiling import can_compile

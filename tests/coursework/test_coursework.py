@@ -18,11 +18,11 @@ from kfsheet import DataError, ModelError, load_exercise
 from kfsheet.cli import commands as cli
 from kfsheet.coursework.handout.handouts import handout_bytes, own_run
 from kfsheet.coursework.handout.questions import FIRST, LOOKS_RIGHT, NOT_YET
-from kfsheet.coursework.handout.roster import Student, harmless, read_roster
 from kfsheet.coursework.handout.tokens import read_secret, read_token, token
 from kfsheet.coursework.handout.variation import own_numbers
 from kfsheet.coursework.judging.judge import CREDIT, Mark
 from kfsheet.coursework.reading.collecting import owner
+from kfsheet.coursework.reading.roster import Student, harmless, read_roster
 from kfsheet.coursework.reports.assessing import Assessment
 from kfsheet.coursework.reports.grading import STATUSES, Handed, _fingerprint, _result, grade
 from kfsheet.coursework.reports.marking import _with_words

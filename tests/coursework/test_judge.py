@@ -11,7 +11,7 @@ from students import ADA, SECRET, Paper
 import kfsheet.exercises
 from kfsheet import load_exercise
 from kfsheet.coursework.handout.handouts import handout_bytes
-from kfsheet.coursework.handout.roster import Student
+from kfsheet.coursework.reading.roster import Student
 from kfsheet.coursework.reports.assessing import assess
 from kfsheet.coursework.reports.grading import _judged
 from kfsheet.exercises import exercise_names

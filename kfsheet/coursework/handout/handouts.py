@@ -25,12 +25,12 @@ from kfsheet.coursework.handout.questions import (
     hide,
     question_pages,
 )
-from kfsheet.coursework.handout.roster import Student
 from kfsheet.coursework.handout.variation import own_numbers
 from kfsheet.coursework.judging.judge import asked_steps
 from kfsheet.coursework.judging.workers import Failed, Pool
 from kfsheet.coursework.judging.worlds import Own
 from kfsheet.coursework.reading.belonging import belongs_to, claim
+from kfsheet.coursework.reading.roster import Student
 from kfsheet.errors import DataError, ModelError, WorkbookError
 from kfsheet.exercises import load_exercise
 from kfsheet.files import write_file

@@ -7,7 +7,7 @@ import unicodedata
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from kfsheet.coursework.handout.roster import Student
+from kfsheet.coursework.reading.roster import Student
 from kfsheet.errors import DataError
 
 IGNORED = {"__MACOSX", "Thumbs.db", "desktop.ini"}

@@ -13,10 +13,10 @@ from typing import Any
 
 import kfsheet
 from kfsheet.coursework.handout import tokens
-from kfsheet.coursework.handout.roster import Student
 from kfsheet.coursework.judging.judge import Mark
 from kfsheet.coursework.judging.workers import SECONDS, Failed, Pool, run_on
 from kfsheet.coursework.reading.collecting import owner, submitted_files
+from kfsheet.coursework.reading.roster import Student
 from kfsheet.coursework.reports.assessing import GRADED, NO_TOKEN, OTHER, Assessment, assess
 from kfsheet.files import write_file
 from kfsheet.model.exercise import Exercise

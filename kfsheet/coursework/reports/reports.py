@@ -12,10 +12,10 @@ from itertools import cycle
 from pathlib import Path
 from textwrap import shorten
 
-from kfsheet.coursework.handout.roster import harmless
 from kfsheet.coursework.judging.diagnosis import RIGHT
 from kfsheet.coursework.judging.judge import CREDIT, Mark
 from kfsheet.coursework.reading.places import Places
+from kfsheet.coursework.reading.roster import harmless
 from kfsheet.coursework.reading.submission import read_submission
 from kfsheet.coursework.reports.grading import STATUSES, Handed, Result
 from kfsheet.coursework.reports.marking import colour_of, mark_workbook
