@@ -27,7 +27,8 @@ _HOMES = {
     "kfsheet.model.expressions": "Count Largest Last Mean Missing Observed RMS Smallest Std Sum "
     "SumProduct t when_observed",
     "kfsheet.estimation.least_squares": "least_squares newton_step normal_equations",
-    "kfsheet.estimation.kalman": "Intermediate Observation State StateSpace add_filter",
+    "kfsheet.estimation.kalman": "add_filter",
+    "kfsheet.estimation.state_space": "Intermediate Observation State StateSpace",
     "kfsheet.printing.latex": "latex_code",
     "kfsheet.evaluation.plots": "draw",
     "kfsheet.printing.python": "python_code",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Generator, Iterator, Sequence
-from typing import TYPE_CHECKING
 
 from sympy import (
     Abs,
@@ -25,12 +24,10 @@ from sympy import (
 )
 
 from kfsheet.estimation.filter_cells import Definition, FilterCells, when_words
+from kfsheet.estimation.state_space import Observation, StateSpace
 from kfsheet.model.expressions import Missing, Observed
+from kfsheet.model.recurrence import Recurrence
 from kfsheet.model.unit_text import Unit
-
-if TYPE_CHECKING:
-    from kfsheet.estimation.kalman import Observation, StateSpace
-    from kfsheet.model.recurrence import Recurrence
 
 MOST_ASKED = 2  # cells that may be missing, in the formula of NIS; more give shares columns
 MOST_TERMS = 6  # of a product of matrices within one formula; more get columns of their own

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Set
+from collections.abc import Callable, Iterator, Mapping, Set
 from functools import lru_cache
 from typing import Any
 
@@ -21,7 +21,8 @@ from sympy import (
 from sympy.logic.boolalg import And, Not, Or
 
 from kfsheet.errors import ModelError, PrintError
-from kfsheet.model.expressions import Aggregate, Observed, column_references, lag
+from kfsheet.model.expressions import Aggregate, Last, Observed, column_references, lag
+from kfsheet.model.quantities import Column, Scalar
 from kfsheet.printing.python import python_code
 
 LARGEST_NUMBER, LARGEST_DENOMINATOR = 12, 16
@@ -139,6 +140,32 @@ def check_observed(name: str, expression: Expr, gap_possible: Callable[[Indexed]
             f"{name} reads {culprit}, which may be missing; "
             f"write when_observed({culprit}, ...) around the part that needs it"
         )
+
+
+def check_gaps(column: Column, find: Callable[[str], Column]) -> None:
+    """Refuse a column with a rule that reads a value which may be missing where the rule holds."""
+    for first, rule in enumerate(column.rules):
+        # A start value holds in its own row, the general expression in all that follow.
+        last = first if first < len(column.start) else ENDLESS
+
+        def gap_possible(cell: Indexed, first: int = first, last: int = last) -> bool:
+            back = int(lag(cell))
+            return find(str(cell.base.label)).gap_possible(range(first - back, last - back + 1))
+
+        check_observed(column.name, rule, gap_possible)
+
+
+def check_summaries(
+    name: str, rule: Expr, summaries: Mapping[str, Scalar], find: Callable[[str], Column]
+) -> None:
+    """Refuse an aggregate inside a column, and a summary that may have no value."""
+    if rule.has(Aggregate):
+        raise ModelError(f"{name} holds an aggregate; make it a summary() and read that")
+    for symbol in scalars(rule):
+        summary = summaries.get(symbol.name)
+        for last in summary.expression.atoms(Last) if summary else ():
+            if find(str(last.args[0].label)).may_be_missing:
+                raise ModelError(f"{name} reads {symbol}, which may be missing in the last row")
 
 
 def _unguarded(e: Basic, known: frozenset, gap_possible: Callable[[Indexed], bool]) -> Basic | None:
