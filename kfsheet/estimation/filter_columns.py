@@ -116,6 +116,7 @@ class FilterColumns(FilterCells):
         """P_f = F P_a F' + Q, the upper triangle."""
         FP = F * self.covariances("a", back=1)
         P_f = (FP * F.T).applyfunc(expand)
+        # A product of three matrices makes formulas that nobody can audit; F P gets columns.
         if max(map(_terms, P_f)) > MOST_TERMS:
             for i, j in itertools.product(self.all, repeat=2):
                 if FP[i, j] == 0:
@@ -149,6 +150,8 @@ class FilterColumns(FilterCells):
                 unit / self.units[j],
                 f"derivative of {o.name} with respect to {name}, at the forecast",
             )
+        # Those before have moved x, but h is linearised at x_f for all of them: only then
+        # is the result that of the joint update. What they explained of d is h (x - x_f).
         moved = [now - before for now, before in zip(self.x, x_f, strict=True)]
         if all(h[j] == 0 or moved[j] == 0 for j in self.all):
             return h, self.cell(f"d_{o.name}")
@@ -193,6 +196,7 @@ class FilterColumns(FilterCells):
         yield self.column(f"S_{o.name}", variance, unit**2, f"variance of {d.base}")
         K = {i: self.cell(f"K_{self.names[i]}_{o.name}") for i in touched}
         for i in touched:
+            # Without an observation the gain is 0, not missing: P then stays what it was.
             gain = self.guarded(self.gated(o, Ph[i] / S_o, d, S_o), asked, S.Zero)
             words = f"gain: {self.names[i]} for one unit of {d.base}"
             yield self.column(f"K_{self.names[i]}_{o.name}", gain, self.units[i] / unit, words)
@@ -219,6 +223,7 @@ class FilterColumns(FilterCells):
         for i, j in self.pairs():
             if i in K and j in K:
                 stage = self.stage(k, i, j)
+                # K S K' is symmetric as computed, K h P only in exact arithmetic.
                 rule = self.P[i, j] - K[i] * K[j] * S_o
                 rule = self.guarded(rule, (S_o,) if self.gaps(o.variance) else (), self.P[i, j])
                 start = self.cell(self.P_name(i, j, "f")) if stage == "a" else Missing
@@ -256,6 +261,7 @@ class FilterColumns(FilterCells):
                 yield self.column(f"NIS_{o.name}", part, Unit.read(""), f"share of {o.name}")
                 parts[n] = self.cell(f"NIS_{o.name}")
         rule = Add(*parts)
+        # A row without any observation has no NIS; 0 would lower its mean.
         if missing_some:
             rule = Piecewise((rule, Or(*seen)), (Missing, True))
         words = f"normalised innovation squared; expected: {len(parts)}"

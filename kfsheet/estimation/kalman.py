@@ -54,6 +54,8 @@ def add_filter(m: Recurrence, model: StateSpace, *, section: str, suffix: str = 
         If a name is taken, or an expression reads what the recurrence does not know.
     """
     definitions = list(FilterColumns(m, model, suffix))
+    # All are announced before any is defined: a gain reads the analysis of the row before, which
+    # stands further right.
     m.columns(*(d.name for d in definitions), section=section)
     for d in definitions:
         m.define(m[d.name][t], d.rule, d.unit, d.words, start=[d.start])

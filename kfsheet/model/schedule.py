@@ -70,6 +70,7 @@ def refuse_circle(model: Definitions, new: Column) -> None:
     It must wait for itself, in its own row or through a summary of a whole column; the order of all
     columns, which takes long, is found only to say which circle it is.
     """
+    # A summary waits for a whole column, so it closes a circle whatever the lag.
     reads = needed(model, [new.name]) & set(model.summaries)
     if new.name in needed(model, reads) or _waits_for_itself(model, new.name):
         schedule(model)
@@ -93,6 +94,8 @@ def _levels(model: Definitions) -> dict[str, int]:
     """Pass in which a column is computed; a summary stands one level above its columns."""
     columns, summaries = model.all_columns(), model.summaries
     level = {item.name: 0 for item in (*columns, *summaries.values())}
+    # Raise levels until nothing moves. Without a circle that takes at most one round for each name
+    # (as Bellman and Ford find longest paths); a circle raises itself for ever.
     for _ in range(len(level) + 1):
         before = dict(level)
         for column in columns:
@@ -133,6 +136,7 @@ def _circle(reads: dict[str, set[str]]) -> list[str]:
     """Follow what each column waits for until a name comes back; every one waits for another."""
     path = [next(iter(reads))]
     while True:
+        # Any that it waits for will do; the smallest name makes the message the same every time.
         following = min(reads[path[-1]])
         if following in path:
             return [*path[path.index(following) :], following]

@@ -120,6 +120,7 @@ class UnitWalker:
 
     def of(self, e: Basic) -> Quantity | None:
         """Unit of a node; None for 0 and Missing, which have every unit."""
+        # 0 m and 0 px are the same nothing, so that v = 0 may start any column.
         if e == 0 or e is Missing:
             return None
         if isinstance(e, Number | NumberSymbol):
@@ -177,6 +178,7 @@ class UnitWalker:
         base = self.of(e.base)
         if base is None or (base.unitless and self.same(base, self.none)):
             return base
+        # A parameter may be an exponent, as p of dt**p; its value decides the unit.
         known = {s: self.values[s.name] for s in e.exp.free_symbols if str(s) in self.values}
         exponent = e.exp.subs(known)
         if not exponent.is_number:

@@ -39,6 +39,7 @@ def checked_expression(name: str, expression: Any) -> Expr:
         raise ModelError(f"{name} is defined as {expression!r}; give a SymPy expression") from None
     if not isinstance(expression, Expr):
         raise ModelError(f"{name} is defined as {expression}, which is no number in a row")
+    # 0.5 is what people write for a half; SymPy would carry it as a float and print 0.5*x.
     expression = expression.xreplace({f: _exact(f) for f in expression.atoms(Float)})
     for number in (node for node in walk(expression) if isinstance(node, Float | Rational)):
         if isinstance(number, Float) or not _small(number):
@@ -47,6 +48,7 @@ def checked_expression(name: str, expression: Any) -> Expr:
                 "so that it has a name, a unit and a place where it can be changed"
             )
     _check_columns(name, expression)
+    # What cannot be printed now would fail later, far from the line that wrote it.
     try:
         python_code(expression)
     except PrintError as error:

@@ -24,6 +24,6 @@ def test_the_former_name_of_the_tennis_methods_warns_and_tells_the_new_one(forgo
 
 
 def test_a_camera_of_the_former_name_is_a_camera_of_the_new_one(forgotten):
-    with pytest.warns(DeprecationWarning):
+    with pytest.warns(DeprecationWarning, match="0.3.0"):
         former = importlib.import_module("kfsheet.tennis.cameras")
     assert former.Camera is cameras.Camera
