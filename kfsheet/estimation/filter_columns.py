@@ -23,6 +23,8 @@ from sympy import (
     zeros,
 )
 
+from kfsheet.errors import ModelError
+from kfsheet.estimation.derivatives import derivative
 from kfsheet.estimation.filter_cells import Definition, FilterCells, when_words
 from kfsheet.estimation.state_space import Observation, StateSpace
 from kfsheet.model.expressions import Missing, Observed
@@ -52,6 +54,7 @@ class FilterColumns(FilterCells):
     """
 
     def __init__(self, m: Recurrence, model: StateSpace, suffix: str) -> None:
+        _check_names(m, model)
         super().__init__(m, model, suffix)
         self.weighed: list[tuple[Indexed, Indexed, tuple[Indexed, ...]]] = []
         self.x = [self.cell(f"{name}_f") for name in self.names]
@@ -100,11 +103,11 @@ class FilterColumns(FilterCells):
         """Derivatives of a value with respect to the state, by the chain rule."""
         found = []
         for j, symbol in enumerate(self.model.state):
-            inner = Add(*(value.diff(w) * slope[j] for w, slope in known.items()))
+            inner = Add(*(derivative(value, w) * slope[j] for w, slope in known.items()))
             words = f"derivative of {what} with respect to {symbol}"
             slope = yield from self.derivative(
                 f"{name}_{symbol}",
-                value.diff(symbol) + inner,
+                derivative(value, symbol) + inner,
                 x_a,
                 unit / self.units[j],
                 words,
@@ -273,6 +276,17 @@ class FilterColumns(FilterCells):
         if o.gate is None:
             return gain
         return Piecewise((gain, Abs(d) <= o.gate * sqrt(S_o)), (S.Zero, True))
+
+
+def _check_names(m: Recurrence, model: StateSpace) -> None:
+    """Refuse a state or an intermediate that is called like a scalar: its cell would replace it."""
+    scalars = {**m.parameters, **m.derived_scalars, **m.summaries}
+    for symbol in (*model.state, *model.intermediates):
+        if symbol.name in scalars:
+            raise ModelError(
+                f"{m.name} has a scalar {symbol.name} and the state space too; a formula could not "
+                "tell which is meant, so give one of them another name"
+            )
 
 
 def _terms(expression: Expr) -> int:

@@ -16,6 +16,7 @@ from functools import cached_property
 from sympy import Expr, Matrix, Symbol, sympify
 
 from kfsheet.errors import ModelError
+from kfsheet.estimation.derivatives import jacobian
 
 
 @dataclass(frozen=True)
@@ -154,15 +155,15 @@ class StateSpace:
     @cached_property
     def F(self) -> Matrix:
         """Jacobian of the transition, n x n, as a function of the state alone."""
-        f = Matrix(list(self.transition))
+        f = [sympify(rule) for rule in self.transition]
         for symbol, item in reversed(self.intermediates.items()):
-            f = f.xreplace({symbol: item.value})
-        return f.jacobian(list(self.state))
+            f = [rule.xreplace({symbol: item.value}) for rule in f]
+        return jacobian(f, list(self.state))
 
     @cached_property
     def H(self) -> Matrix:
         """Jacobian of the observed quantities, m x n."""
-        return Matrix([o.predicted for o in self.observations]).jacobian(list(self.state))
+        return jacobian([o.predicted for o in self.observations], list(self.state))
 
 
 def _sympify(thing: State | Observation | Intermediate, *names: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Set
 from functools import lru_cache
+from math import factorial
 from typing import Any
 
 from sympy import (
@@ -26,6 +27,12 @@ from kfsheet.model.quantities import Column, Scalar
 from kfsheet.printing.python import python_code
 
 LARGEST_NUMBER, LARGEST_DENOMINATOR = 12, 16
+# Denominators of Taylor's series, k!, and of the noise that integrators of white noise gather,
+# i! j! (i + j + 1): dt^5/20 for a constant acceleration, dt^7/252 one order further.
+OF_SERIES = {
+    *(factorial(k) for k in range(8)),
+    *(factorial(i) * factorial(j) * (i + j + 1) for i in range(5) for j in range(5)),
+}
 FULL_CIRCLE = {60, 90, 180, 360}
 REMEMBERED = 4096  # expressions whose parts are asked for again and again by schedule()
 ENDLESS = 1_048_576  # more rows than a worksheet has
@@ -70,7 +77,8 @@ def _check_columns(name: str, expression: Expr) -> None:
 
 
 def _small(number: Rational) -> bool:
-    small = abs(number.p) <= LARGEST_NUMBER and number.q <= LARGEST_DENOMINATOR
+    denominators = number.q <= LARGEST_DENOMINATOR or number.q in OF_SERIES
+    small = abs(number.p) <= LARGEST_NUMBER and denominators
     return small or {abs(number.p), number.q} <= FULL_CIRCLE | {1}
 
 
