@@ -11,7 +11,7 @@ from scipy.stats import multivariate_normal, norm
 
 from kfsheet import NEES, Draws, evaluate
 from kfsheet.exercises.cannonball import cannonball
-from tests.exercises.test_cannonball import DT, NAMES, P_0, F, G, N, radar_slope
+from tests.exercises.cannonball.test_cannonball import DT, NAMES, P_0, F, G, N, radar_slope
 
 B = np.array([304.8, -30.48, -304.8, 30.48])
 R = np.diag([0.01**2, 30.48**2])

@@ -15,7 +15,7 @@ from kfsheet import DataError
 from kfsheet.evaluation.evaluate import run
 from kfsheet.exercises.shuttlecock import FORECASTS, shuttlecock
 from kfsheet.exercises.shuttlecock.outliers import struck_frames, with_outliers
-from tests.exercises.test_shuttlecock import TIME, V_0, G, K, N, rms, track
+from tests.exercises.shuttlecock.test_shuttlecock import TIME, V_0, G, K, N, rms, track
 
 RUNS = 400
 POSITIONS = [f"e_{a}_{r}" for a in "xyz" for r in ("obs", "a")]

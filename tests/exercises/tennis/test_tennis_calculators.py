@@ -11,7 +11,7 @@ from kfsheet.exercises.tennis import tennis
 from kfsheet.exercises.tennis.methods.cameras import error_diamond, rms_error
 from kfsheet.exercises.tennis.methods.centroid import centroid, lambert_shift
 
-WORKBOOKS = Path(__file__).parents[2] / "workbooks"
+WORKBOOKS = Path(__file__).parents[3] / "workbooks"
 
 
 def test_the_cameras_sheet_is_the_library():

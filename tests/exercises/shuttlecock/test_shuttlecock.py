@@ -22,7 +22,7 @@ from kfsheet.exercises.shuttlecock.forecasts import add_fit, add_latest, track_f
 from kfsheet.workbook.engines.recalculate import open_workbook
 from tests.estimation.test_kalman import assert_close, assert_same_filter, joint_filter
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+sys.path.insert(0, str(Path(__file__).parents[3] / "benchmarks"))
 from shuttlecock_three_by_three import (
     compiled_steps,
     counted,
@@ -395,7 +395,7 @@ def test_the_sums_of_the_fit_are_those_of_the_normal_equations():
 
 def test_a_wide_sheet_prints_on_several_pages_each_with_frame_and_time():
     """On one page, 72 columns would be some 4 mm wide each."""
-    book = open_workbook(Path(__file__).parents[2] / "workbooks" / "shuttlecock.xlsx")
+    book = open_workbook(Path(__file__).parents[3] / "workbooks" / "shuttlecock.xlsx")
     wide, narrow = book["Kalman"], book["Camera"]
     assert wide.max_column / wide.page_setup.fitToWidth <= 16
     assert wide.print_title_cols == "$A:$B"

@@ -11,7 +11,7 @@ from sympy import atan
 from kfsheet import NEES, Draws, evaluate
 from kfsheet.exercises.cannonball import build_model, cannonball
 from tests.estimation.test_kalman import assert_close
-from tests.exercises.test_cannonball import (
+from tests.exercises.cannonball.test_cannonball import (
     DT,
     FALL,
     NAMES,

@@ -17,9 +17,9 @@ from kfsheet.exercises.cannonball import cannonball, exercise
 from kfsheet.workbook.write.contents import chart_range
 from kfsheet.workbook.write.layout import Layout
 from tests.estimation.test_kalman import assert_close
-from tests.exercises.test_cannonball import NAMES, N
+from tests.exercises.cannonball.test_cannonball import NAMES, N
 
-WORKBOOK = Path(__file__).parents[2] / "workbooks" / "cannonball.xlsx"
+WORKBOOK = Path(__file__).parents[3] / "workbooks" / "cannonball.xlsx"
 FORMULA = re.compile("<f[^>]*>([^<]+)</f>")
 
 
