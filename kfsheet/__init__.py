@@ -15,7 +15,9 @@ _HOMES = {
     "kfsheet.estimation.algebra": "analysis correlated_covariance diagonal_analysis discrete_noise "
     "gain_limits sequential_gain transition_matrix transition_matrix_laplace",
     "kfsheet.model.chart": "Chart Series",
-    "kfsheet.ensemble.draws": "Draws NEES Study",
+    "kfsheet.ensemble.draws": "Draws",
+    "kfsheet.ensemble.nees": "NEES",
+    "kfsheet.ensemble.study": "Study study",
     "kfsheet.errors": "DataError EngineError KfsheetError ModelError PrintError WorkbookError",
     "kfsheet.evaluation.evaluate": "evaluate warm_up",
     "kfsheet.workbook.check.check": "check_workbook",

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import students as do
 
-from kfsheet import Draws, evaluate
+from kfsheet import Draws, study
 from kfsheet.coursework.judging.workers import run_on
 from kfsheet.coursework.reading.roster import Student
 from kfsheet.coursework.reports.grading import grade
@@ -38,9 +38,9 @@ def pixels():
 def test_a_cluster_computes_the_same_to_the_last_bit(cluster, monkeypatch, options, compiled):
     monkeypatch.setattr("kfsheet.ensemble.study.MOST", 8)  # seven groups for two processes
     asked = {"columns": ["e_x_a"], "scalars": ("rms_x_a", "K_x"), "compiled": compiled}
-    here = evaluate(football, members=MANY, **asked, **options)
+    here = study(football, MANY, **asked, **options)
     with cluster.get_executor() as executor:
-        there = evaluate(football, members=MANY, executor=executor, **asked, **options)
+        there = study(football, MANY, executor=executor, **asked, **options)
     assert there.rows["e_x_a"].equals(here.rows["e_x_a"])
     assert there.scalars.equals(here.scalars)
     assert here.scalars.loc["rms_x_a", "std"] > 0

@@ -8,7 +8,7 @@ from scipy.stats import chi2
 from scipy.stats import t as student
 from sympy import atan
 
-from kfsheet import NEES, Draws, evaluate
+from kfsheet import NEES, Draws, evaluate, study
 from kfsheet.exercises.cannonball import build_model, cannonball
 from tests.estimation.test_kalman import assert_close
 from tests.exercises.cannonball.test_cannonball import (
@@ -79,17 +79,17 @@ def ensembles(number, model=cannonball, **parameters):
     """The figures that are known of an independent calculation, for every forty flights."""
     lines = []
     for seed in range(number):
-        study = evaluate(
+        ensemble = study(
             model,
+            FLIGHTS,
             Draws("n_theta", "n_r", seed=seed),
-            members=FLIGHTS,
             columns=[*ERRORS, "NIS"],
             nees={"NEES": NEES(NAMES)},
             **parameters,
         )
-        line = {f"{e} flight": rms(study.rows[e]["rms"]) for e in ERRORS}
-        line |= {f"{e} late": rms(study.rows[e]["rms"][LATE]) for e in ERRORS}
-        line |= {e: study.rows[e]["mean"] for e in ("NIS", "NEES")}
+        line = {f"{e} flight": rms(ensemble.rows[e]["rms"]) for e in ERRORS}
+        line |= {f"{e} late": rms(ensemble.rows[e]["rms"][LATE]) for e in ERRORS}
+        line |= {e: ensemble.rows[e]["mean"] for e in ("NIS", "NEES")}
         lines.append(line)
     return lines
 
@@ -191,17 +191,17 @@ def spread():
     }
     found = {}
     for name, model in variants.items():
-        study = evaluate(
+        ensemble = study(
             model,
+            FLIGHTS,
             Draws("n_theta", "n_r", seed=0),
-            members=FLIGHTS,
             columns=["e_x_a", "e_y_a"],
             scalars=["rms_x_a"],
             quantiles=np.linspace(0, 1, FLIGHTS),  # as many as there are flights: each of them
         )
-        errors = study.scalars.filter(like="quantile").loc["rms_x_a"].to_numpy()
-        assert rms(errors) == pytest.approx(rms(study.rows["e_x_a"]["rms"]))
-        found[name] = errors, study.rows
+        errors = ensemble.scalars.filter(like="quantile").loc["rms_x_a"].to_numpy()
+        assert rms(errors) == pytest.approx(rms(ensemble.rows["e_x_a"]["rms"]))
+        found[name] = errors, ensemble.rows
     return found
 
 

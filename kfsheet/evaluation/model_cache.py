@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass
-class Facts:
+class ModelCache:
     """What every run of one version of a model needs, found once."""
 
     rows: int
@@ -109,19 +109,19 @@ class Facts:
         return frame
 
 
-_FACTS: WeakKeyDictionary[Recurrence, tuple[int, Facts]] = WeakKeyDictionary()
+_CACHES: WeakKeyDictionary[Recurrence, tuple[int, ModelCache]] = WeakKeyDictionary()
 
 
-def facts_of(model: Recurrence) -> Facts:
+def cache_of(model: Recurrence) -> ModelCache:
     """What every run of a model needs; found anew when something was added to it."""
-    version, facts = _FACTS.get(model, (None, None))
+    version, cache = _CACHES.get(model, (None, None))
     if version != model.version:
         model.validate()
         default = {c.name: np.array([c.values]) for c in model.all_columns() if c.is_data}
         every = tuple(c.name for c in model.all_columns())
-        facts = Facts(model.rows, default, model.units(), every)
-        _FACTS[model] = (model.version, facts)
-    return facts
+        cache = ModelCache(model.rows, default, model.units(), every)
+        _CACHES[model] = (model.version, cache)
+    return cache
 
 
 @lru_cache(maxsize=32)
