@@ -13,6 +13,7 @@ from kfsheet.exercises.football import exercise
 from kfsheet.workbook.engines.recalculate import ENGINES, libreoffice
 from kfsheet.workbook.write.workbook import write_workbook
 
+collect_ignore = ["package/users_study.py"]  # mypy reads it; nothing is to run
 matplotlib.use("Agg")
 # Compiled models of one test run, shared by its workers and forgotten with the temporary files.
 RUN = os.environ.get("PYTEST_XDIST_TESTRUNUID") or str(os.getpid())

@@ -1,6 +1,8 @@
-"""Make the notebooks from their py:percent sources, and execute them.
+"""Make the notebooks from their py:percent sources, and execute them, two at a time.
 
     python tools/execute_notebooks.py [notebooks/01_football.py ...]
+
+Without names: those whose source, package or outputs have changed since they were executed here.
 
 The same source gives the same file: cells are numbered, times and versions are left out, and a
 cell tagged ``interactive`` (a widget, with random names) keeps no output and is not run here; nbval
@@ -9,16 +11,19 @@ runs it.
 
 import os
 import sys
+import time
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 
 import jupytext
 import nbformat
+from made import ROOT, everything, is_made, note_made
 from nbclient import NotebookClient
 
-from kfsheet.cli.terminal import progress
 from kfsheet.files import write_file
 
-FOLDER = Path(__file__).parents[1] / "notebooks"
+FOLDER = ROOT / "notebooks"
+AT_A_TIME = 2
 KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
 
 
@@ -62,12 +67,28 @@ def executed(source: Path) -> nbformat.NotebookNode:
     return notebook
 
 
+def timed(source: Path) -> tuple[nbformat.NotebookNode, float]:
+    """The executed notebook, and the seconds that it took."""
+    begin = time.perf_counter()
+    return executed(source), time.perf_counter() - begin
+
+
 def main(names: list[str]) -> None:
-    """Execute the notebooks named, or all."""
-    sources = [Path(name) for name in names] or sorted(FOLDER.glob("*.py"))
-    for source in progress(sources, "notebook", len(sources), lambda s: s.name):
-        text = nbformat.writes(executed(source)) + "\n"
-        write_file(source.with_suffix(".ipynb"), text.encode())
+    """Execute the notebooks named, or all that are not as their sources would make them."""
+    package = everything()
+    sources = [Path(name).resolve() for name in names] or sorted(FOLDER.glob("*.py"))
+    stale = [s for s in sources if names or not is_made(s.with_suffix(".ipynb"), [*package, s])]
+    # A kernel is a process of its own: a thread has only to wait for it.
+    with ThreadPoolExecutor(AT_A_TIME) as pool:
+        running = {pool.submit(timed, source): source for source in stale}
+        for done in as_completed(running):
+            source = running[done]
+            notebook, seconds = done.result()
+            text = nbformat.writes(notebook) + "\n"
+            write_file(source.with_suffix(".ipynb"), text.encode())
+            note_made(source.with_suffix(".ipynb"), [*package, source])
+            print(f"    {source.stem}.ipynb: {seconds:.0f} s", flush=True)
+    print(f"notebooks: {len(stale)} executed, {len(sources) - len(stale)} as they were")
 
 
 if __name__ == "__main__":
