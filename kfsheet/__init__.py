@@ -18,10 +18,10 @@ _HOMES = {
     "kfsheet.ensemble.draws": "Draws NEES Study",
     "kfsheet.errors": "DataError EngineError KfsheetError ModelError PrintError WorkbookError",
     "kfsheet.evaluation.evaluate": "evaluate warm_up",
-    "kfsheet.workbook.check.check": "check_workbook",
+    "kfsheet.workbook.check.check_workbook": "check_workbook",
     "kfsheet.printing.excel": "excel_code",
     "kfsheet.workbook.engines.recalculate": "recalculate",
-    "kfsheet.workbook.write.workbook": "write_workbook",
+    "kfsheet.workbook.write.write_workbook": "write_workbook",
     "kfsheet.model.exercise": "Exercise Question",
     "kfsheet.exercises": "exercise_names load_exercise",
     "kfsheet.model.expressions": "Count Largest Last Mean Missing Observed RMS Smallest Std Sum "
