@@ -28,7 +28,7 @@ from kfsheet.coursework.reports.grading import STATUSES, Handed, _fingerprint, _
 from kfsheet.coursework.reports.marking import _with_words
 from kfsheet.exercises import exercise_names
 from kfsheet.model.exercise import Exercise
-from kfsheet.workbook.check.check import check_workbook
+from kfsheet.workbook.check.check_workbook import check_workbook
 from kfsheet.workbook.engines.recalculate import recalculate
 
 FOOTBALL = load_exercise("football")

@@ -15,7 +15,7 @@ from kfsheet.coursework.reading.roster import Student
 from kfsheet.coursework.reports.assessing import assess
 from kfsheet.coursework.reports.grading import _judged
 from kfsheet.exercises import exercise_names
-from kfsheet.workbook.engines.recalculate import convert, libreoffice
+from kfsheet.workbook.engines.libreoffice import convert, libreoffice
 
 FULL = {"status": "right", "remark": ""}
 

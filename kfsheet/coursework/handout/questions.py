@@ -17,9 +17,9 @@ from openpyxl.workbook import Workbook
 from kfsheet.coursework.handout import tokens
 from kfsheet.errors import ModelError
 from kfsheet.model.exercise import Exercise, Question
-from kfsheet.workbook.write.contents import Run
 from kfsheet.workbook.write.layout import FIRST_ROW, TOKEN_NAME, Layout, quote
-from kfsheet.workbook.write.page import Page
+from kfsheet.workbook.write.run import Run
+from kfsheet.workbook.write.sheet import Sheet
 
 SHEET, HIDDEN = "Questions", "kfsheet"
 FIRST, MODULUS = 7, 997
@@ -101,9 +101,9 @@ def checksum(salt: Salt, total: float) -> int:
 
 def question_pages(
     exercise: Exercise, layout: Layout, now: Run, secret: bytes, student: tuple[str, str]
-) -> list[Page]:
+) -> list[Sheet]:
     """The visible sheet of questions, and the hidden one with salts and token."""
-    page, hidden = Page(SHEET, widths=dict(WIDTHS)), Page(HIDDEN)
+    page, hidden = Sheet(SHEET, widths=dict(WIDTHS)), Sheet(HIDDEN)
     page.put(1, 1, f"{exercise.title}: questions for {student[1]}", "title")
     for row, words in ((3, HOW), (4, FEEDBACK)):
         _put_paragraph(page, row, words)
@@ -121,21 +121,21 @@ def question_pages(
     return [page, hidden]
 
 
-def _put_task(page: Page, row: int, task: tuple[str, ...]) -> None:
+def _put_task(page: Sheet, row: int, task: tuple[str, ...]) -> None:
     if task:
         page.put(row, 1, "What you need to know", "heading")
     for line, words in enumerate(task, row + 1):
         _put_paragraph(page, line, words)
 
 
-def _put_paragraph(page: Page, row: int, words: str) -> None:
+def _put_paragraph(page: Sheet, row: int, words: str) -> None:
     page.put(row, 1, words, "text", align="wrap")
     page.merges.append(f"A{row}:H{row}")
     page.heights[row] = 15 * (1 + len(words) // CHARACTERS_A_LINE) + 5
 
 
 def _put_question(
-    page: Page, row: int, layout: Layout, question: Question, values: list[float], right: int
+    page: Sheet, row: int, layout: Layout, question: Question, values: list[float], right: int
 ) -> None:
     page.put(row, 1, question.name, "index")
     page.put(row, 2, question.points, "index", align="center")
@@ -145,7 +145,7 @@ def _put_question(
     page.put(row, 10, sum(not isnan(v) for v in values), "index")
 
 
-def _put_formulas(page: Page, row: int, column: int, layout: Layout, question: Question) -> None:
+def _put_formulas(page: Sheet, row: int, column: int, layout: Layout, question: Question) -> None:
     cells, letter = place_of(layout, question), get_column_letter(column)
     weights = f"{HIDDEN}!{letter}{FIRST_ROW + 1}:{letter}{FIRST_ROW + layout.model.rows}"
     if question.name in layout.scalars:
@@ -165,7 +165,7 @@ def _put_formulas(page: Page, row: int, column: int, layout: Layout, question: Q
     page.put(row, 8, words, "formula", align="center")
 
 
-def _put_salt(hidden: Page, column: int, question: Question, salt: Salt) -> None:
+def _put_salt(hidden: Sheet, column: int, question: Question, salt: Salt) -> None:
     hidden.put(2, column, question.name, "index")
     for row, number in enumerate((salt.factor, salt.shift, *salt.weights), 3):
         hidden.put(row, column, number, "index")

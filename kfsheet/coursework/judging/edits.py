@@ -18,9 +18,10 @@ from kfsheet.coursework.reading.worksheet import Content, Formula
 from kfsheet.errors import FormulaError
 from kfsheet.model.exercise import Exercise
 from kfsheet.parsing.references import Address, relative_key
-from kfsheet.workbook.write.contents import Run, section_page
+from kfsheet.workbook.write.exercise_sheets import section_sheet
 from kfsheet.workbook.write.layout import Layout
-from kfsheet.workbook.write.page import Piece, is_formula
+from kfsheet.workbook.write.run import Run
+from kfsheet.workbook.write.sheet import Cell, is_formula
 
 SAMPLE = 40  # rows of a long table that are looked at
 
@@ -111,10 +112,10 @@ def _original(exercise: Exercise) -> _Original:
         layout = Layout.standard(exercise.model)
         book = Book("")
         now = Run.of(exercise.model)
-        for page in (section_page(layout, section, now) for section in exercise.model.sections):
+        for page in (section_sheet(layout, section, now) for section in exercise.model.sections):
             book.sheets[page.title] = {
                 cell: Formula(piece.content, cell) if is_formula(piece.content) else _plain(piece)
-                for cell, piece in page.cells()
+                for cell, piece in page.all_cells()
                 if piece.content is not None
             }
         book.sheets["Parameters"] = {}
@@ -129,6 +130,6 @@ def _reference(address: Address) -> str:
     return f"{sheet}!${get_column_letter(column)}${row}"
 
 
-def _plain(piece: Piece) -> Content:
+def _plain(piece: Cell) -> Content:
     content = piece.content
     return float(content) if isinstance(content, int | float) else str(content)

@@ -16,9 +16,8 @@ from pathlib import Path
 from kfsheet.errors import EngineError, KfsheetError
 from kfsheet.parsing.references import Address
 from kfsheet.processes import answers, command
-from kfsheet.workbook.engines.copies import Changes
-from kfsheet.workbook.engines.ironcalc import CellValue
 from kfsheet.workbook.engines.recalculate import open_in
+from kfsheet.workbook.engines.spreadsheet_engine import CellValue, Changes
 
 
 def calculated(

@@ -18,8 +18,7 @@ from kfsheet.coursework.judging.judge import asked_steps
 from kfsheet.coursework.judging.worlds import ALONE, Scene, World
 from kfsheet.coursework.reading.places import Places
 from kfsheet.errors import KfsheetError
-from kfsheet.workbook.engines.copies import Changes
-from kfsheet.workbook.engines.ironcalc import CellValue
+from kfsheet.workbook.engines.spreadsheet_engine import CellValue, Changes
 
 RUNS = (0, 2, 4, 6, 1, 3)
 """Numbers of the worlds: four near the model's own run, two anywhere."""

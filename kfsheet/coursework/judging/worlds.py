@@ -24,7 +24,7 @@ from kfsheet.model.quantities import Column, Parameter
 from kfsheet.model.recurrence import Recurrence
 from kfsheet.model.schedule import same_row
 from kfsheet.model.validation import columns_read, scalars
-from kfsheet.workbook.write.contents import Run
+from kfsheet.workbook.write.run import Run
 
 ALONE = -1
 """Depth of the worlds in which every column is drawn by itself."""

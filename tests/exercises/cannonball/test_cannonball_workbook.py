@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from kfsheet import DataError, ModelError, draw, evaluate, recalculate
 from kfsheet.exercises.cannonball import cannonball, exercise
-from kfsheet.workbook.write.contents import chart_range
+from kfsheet.workbook.write.exercise_sheets import chart_range
 from kfsheet.workbook.write.layout import Layout
 from tests.estimation.test_kalman import assert_close
 from tests.exercises.cannonball.test_cannonball import NAMES, N

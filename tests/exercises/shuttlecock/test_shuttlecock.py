@@ -19,7 +19,7 @@ from kfsheet.estimation.drag import distorted, flight
 from kfsheet.exercises.shuttlecock import DATA, build_model, shuttlecock
 from kfsheet.exercises.shuttlecock.filters import joint_model
 from kfsheet.exercises.shuttlecock.forecasts import add_fit, add_latest, track_fit
-from kfsheet.workbook.engines.recalculate import open_workbook
+from kfsheet.workbook.reading.open_workbook import open_workbook
 from tests.estimation.test_kalman import assert_close, assert_same_filter, joint_filter
 
 sys.path.insert(0, str(Path(__file__).parents[3] / "benchmarks"))

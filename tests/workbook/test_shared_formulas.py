@@ -11,9 +11,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from openpyxl.workbook.defined_name import DefinedName
 
-from kfsheet.workbook.engines.copies import copy_for_ironcalc
+from kfsheet.workbook.engines.copies_for_engines import copy_for_ironcalc
 from kfsheet.workbook.engines.ironcalc import IronCalc
-from kfsheet.workbook.engines.shared_formulas import shared
+from kfsheet.workbook.engines.shared_formulas import share_formulas
 
 WORKBOOKS = sorted((Path(__file__).parents[2] / "workbooks").glob("*.xlsx"))
 OTHER = "Q 5"  # a worksheet whose name looks like a reference
@@ -100,7 +100,7 @@ def test_any_column_of_formulas_computes_the_same(tmp_path, columns):
 @pytest.mark.parametrize("rule", MOVING)
 def test_a_formula_that_is_filled_down_is_written_once(rule):
     column = "".join(f'<c r="C{r}"><f>{rule.format(r, r + 1)}</f></c>' for r in range(4, 9))
-    copy = shared(column.encode()).decode()
+    copy = share_formulas(column.encode()).decode()
     assert copy.count(rule.format(4, 5)) == 1
     assert copy.count("<f t=") == 5
     assert "<f>" not in copy
@@ -109,7 +109,7 @@ def test_a_formula_that_is_filled_down_is_written_once(rule):
 @pytest.mark.parametrize("rule", STAYING)
 def test_a_formula_that_is_not_filled_down_is_not_shared(rule):
     column = "".join(f'<c r="C{r}"><f>{rule.format(r, r + 1)}</f></c>' for r in range(4, 9))
-    assert '"/>' not in shared(column.encode()).decode()
+    assert '"/>' not in share_formulas(column.encode()).decode()
 
 
 def test_the_files_of_other_programs_are_left_alone(tmp_path):
@@ -122,4 +122,4 @@ def test_the_files_of_other_programs_are_left_alone(tmp_path):
 
 def test_a_cell_without_an_address_is_left_as_it_is():
     row = b'<row r="5"><c r="A5"><v>1</v></c><c><f>B5</f></c></row>'
-    assert shared(row) == row
+    assert share_formulas(row) == row

@@ -22,11 +22,12 @@ from kfsheet import (
 )
 from kfsheet.exercises import load_exercise
 from kfsheet.exercises.football import exercise, football
-from kfsheet.workbook.engines.recalculate import convert, open_in, recalculate
-from kfsheet.workbook.write.contents import Run
+from kfsheet.workbook.engines.libreoffice import convert
+from kfsheet.workbook.engines.recalculate import open_in, recalculate
 from kfsheet.workbook.write.layout import FIRST_ROW, Layout
-from kfsheet.workbook.write.page import is_formula
-from kfsheet.workbook.write.workbook import assemble, compose, workbook_bytes
+from kfsheet.workbook.write.run import Run
+from kfsheet.workbook.write.sheet import is_formula
+from kfsheet.workbook.write.write_workbook import assemble, compose, workbook_bytes
 
 SECTIONS = ["Reanalysis", "Free run", "Errors", "Pixel frame", "Goal line"]
 
@@ -145,7 +146,7 @@ def test_a_formula_that_is_filled_down_is_stored_once_and_is_the_same_in_every_r
     path = write_workbook(other, tmp_path)
     book = openpyxl.load_workbook(path)
     for page in compose(other, layout, now, now):
-        for (row, column), piece in page.cells():
+        for (row, column), piece in page.all_cells():
             if is_formula(piece.content):
                 assert book[page.title].cell(row, column).value == piece.content
     with zipfile.ZipFile(path) as archive:

@@ -16,11 +16,10 @@ from kfsheet.model.exercise import Exercise
 from kfsheet.model.quantities import Column
 from kfsheet.model.recurrence import Recurrence
 from kfsheet.parsing.references import Address
-from kfsheet.workbook.engines.copies import Changes
-from kfsheet.workbook.engines.ironcalc import CellValue, Values
-from kfsheet.workbook.engines.recalculate import Asked, ask_about, open_workbook
+from kfsheet.workbook.engines.recalculate import start_engine
+from kfsheet.workbook.engines.spreadsheet_engine import CellValue, Changes, Engine, Values
+from kfsheet.workbook.reading.open_workbook import open_workbook
 from kfsheet.workbook.reading.package import Package
-from kfsheet.workbook.write.contents import Run
 from kfsheet.workbook.write.layout import (
     EXERCISE_NAME,
     EXERCISE_PROPERTY,
@@ -30,17 +29,18 @@ from kfsheet.workbook.write.layout import (
     Layout,
     quote,
 )
+from kfsheet.workbook.write.run import Run
 
 
-class Opened:
+class OpenedWorkbook:
     """A workbook as it stands: its names and formula cells, and the values an engine finds."""
 
     def __init__(
-        self, path: str | Path, engine: str = "ironcalc", asked: Asked | None = None
+        self, path: str | Path, engine: str = "ironcalc", asked: Engine | None = None
     ) -> None:
         """``asked`` is the engine, if it was asked about the file before."""
         self.path, self.engine_name = Path(path), engine
-        self.engine = asked or ask_about(path, engine)
+        self.engine = asked or start_engine(path, engine)
         self.package = Package(path)
         self._among: dict[tuple[range, str, int], set[int]] = {}
 
@@ -110,7 +110,7 @@ class Opened:
         return value
 
 
-def layout_of(book: Opened, exercise: Exercise) -> Layout:
+def layout_of(book: OpenedWorkbook, exercise: Exercise) -> Layout:
     """The layout of a workbook in which a user may have inserted or moved columns.
 
     Raises
@@ -140,7 +140,7 @@ def layout_of(book: Opened, exercise: Exercise) -> Layout:
     return Layout(model, columns, scalars)
 
 
-def _columns_of(book: Opened, model: Recurrence, section: str) -> dict[str, int]:
+def _columns_of(book: OpenedWorkbook, model: Recurrence, section: str) -> dict[str, int]:
     path = book.path
     if section not in book.package.titles:
         raise WorkbookError(f"{path}: the sheet {section!r} is gone or renamed")
@@ -194,7 +194,7 @@ class Inputs:
         return [(sheet, FIRST_ROW + row, column) for row in range(self.layout.model.rows)]
 
 
-def inputs_in(book: Opened, layout: Layout) -> Inputs:
+def inputs_in(book: OpenedWorkbook, layout: Layout) -> Inputs:
     """Parameters and data that stand in a workbook.
 
     Raises
@@ -214,7 +214,7 @@ def inputs_in(book: Opened, layout: Layout) -> Inputs:
     return inputs
 
 
-def _series(book: Opened, column: Column, cells: list[Address]) -> list[float | None]:
+def _series(book: OpenedWorkbook, column: Column, cells: list[Address]) -> list[float | None]:
     sheet, row, number = cells[-1]
     if book.value((sheet, row + 1, number)) is not None:
         raise WorkbookError(
@@ -229,11 +229,11 @@ def _series(book: Opened, column: Column, cells: list[Address]) -> list[float | 
     return series
 
 
-def _content(book: Opened, address: Address) -> Any:
+def _content(book: OpenedWorkbook, address: Address) -> Any:
     """The number in a cell; of a formula, the value that the engine found."""
     content = book.value(address)
     return None if isinstance(content, str) and not content.strip() else content
 
 
-def _where(book: Opened, address: Address) -> str:
+def _where(book: OpenedWorkbook, address: Address) -> str:
     return f" in {place(address)} of {book.path.name}"

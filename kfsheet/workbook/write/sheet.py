@@ -15,7 +15,7 @@ Formula = Callable[[int], str]
 """Text of a formula, ``=`` included, by the row that it stands in."""
 
 
-class Piece(NamedTuple):
+class Cell(NamedTuple):
     """One cell: its content (``=`` begins a formula), kind of style, value of the formula."""
 
     content: Any
@@ -28,7 +28,7 @@ class Piece(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Filled:
+class FilledColumn:
     """A column of a table: cells of one look, made only when somebody asks for them.
 
     ``values`` are the contents of plain cells, or the values of formulas. ``rules`` are the
@@ -49,35 +49,34 @@ class Filled:
         """Rows of the sheet."""
         return range(self.first, self.first + len(self.values))
 
-    def number(self, row: int) -> int:
-        """Which rule holds in a row."""
+    def rule_number(self, row: int) -> int:
+        """Which of the rules holds in a row."""
         return min(row - self.first, len(self.rules) - 1)
 
     def stored(self, row: int) -> Any:
         """Value of the formula in a row."""
-        return stored(self.values[row - self.first], self.missing)
+        return stored_value(self.values[row - self.first], self.missing)
 
-    def piece(self, row: int) -> Piece:
+    def cell(self, row: int) -> Cell:
         """The cell in a row."""
         if not self.rules:
             value = self.values[row - self.first]
             empty = isinstance(value, float) and isnan(value)
-            return Piece(None if empty else value, self.kind, format=self.format)
-        rule = self.rules[self.number(row)]
-        text = rule and rule(row)
-        return Piece(text, self.kind, self.stored(row), self.format, scale=self.scale)
+            return Cell(None if empty else value, self.kind, format=self.format)
+        rule = self.rules[self.rule_number(row)]
+        return Cell(rule and rule(row), self.kind, self.stored(row), self.format, scale=self.scale)
 
 
 @dataclass
-class Page:
+class Sheet:
     """One worksheet: cells, columns that are filled down, widths, and where it is frozen.
 
-    A cell of ``pieces`` takes the place of one that a column has there.
+    One of ``cells`` takes the place of one that a column has there.
     """
 
     title: str
-    pieces: dict[Place, Piece] = field(default_factory=dict)
-    columns: dict[int, Filled] = field(default_factory=dict)
+    cells: dict[Place, Cell] = field(default_factory=dict)
+    columns: dict[int, FilledColumn] = field(default_factory=dict)
     widths: dict[int, float] = field(default_factory=dict)
     heights: dict[int, float] = field(default_factory=dict)
     merges: list[str] = field(default_factory=list)
@@ -88,27 +87,27 @@ class Page:
         """Place one cell."""
         if kind == "title":
             self.heights[row] = TITLE_HEIGHT
-        self.pieces[row, column] = Piece(content, kind, **more)
+        self.cells[row, column] = Cell(content, kind, **more)
 
-    def at(self, row: int, column: int) -> Piece:
+    def cell_at(self, row: int, column: int) -> Cell:
         """The cell in a place; there must be one."""
-        return self.pieces.get((row, column)) or self.columns[column].piece(row)
+        return self.cells.get((row, column)) or self.columns[column].cell(row)
 
-    def cells(self) -> Iterator[tuple[Place, Piece]]:
+    def all_cells(self) -> Iterator[tuple[Place, Cell]]:
         """Every cell with its place."""
-        yield from self.pieces.items()
+        yield from self.cells.items()
         for column, filled in self.columns.items():
             for row in filled.rows:
-                if (row, column) not in self.pieces:
-                    yield (row, column), filled.piece(row)
+                if (row, column) not in self.cells:
+                    yield (row, column), filled.cell(row)
 
     @property
     def width(self) -> int:
         """Number of the last column."""
-        return max([*self.columns, *(column for _, column in self.pieces)])
+        return max([*self.columns, *(column for _, column in self.cells)])
 
 
-def stored(value: Any, missing: str = "") -> Any:
+def stored_value(value: Any, missing: str = "") -> Any:
     """What a spreadsheet holds for a number that may be missing."""
     return (missing if isnan(value) else value) if isinstance(value, float) else value
 

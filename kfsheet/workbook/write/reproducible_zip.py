@@ -23,23 +23,23 @@ PROGRAM = re.compile(rb"(<Application>)[^<]*(</Application>)")
 BY_US = b"kfsheet"
 
 
-def finish(saved: bytes, sheets: Mapping[str, str]) -> bytes:
+def reproducible_zip(saved: bytes, cells: Mapping[str, str]) -> bytes:
     """A saved workbook without moments of time, and with cells.
 
     Parameters
     ----------
     saved : bytes
         What openpyxl saved.
-    sheets : mapping
-        ``sheets[part]`` is the element ``sheetData`` that replaces openpyxl's; ``part`` is the name
+    cells : mapping
+        ``cells[part]`` is the element ``sheetData`` that replaces openpyxl's; ``part`` is the name
         inside the zip, ``xl/worksheets/sheet1.xml``.
     """
     result = BytesIO()
     with zipfile.ZipFile(BytesIO(saved)) as old, zipfile.ZipFile(result, "w") as new:
         for name in sorted(old.namelist()):
             content = old.read(name)
-            if name in sheets:
-                content = _with_cells(content.decode(), sheets[name]).encode()
+            if name in cells:
+                content = _with_cells(content.decode(), cells[name]).encode()
             elif name == "docProps/core.xml":
                 content = MOMENT.sub(r"\g<1>2000-01-01T00:00:00Z\3", content.decode()).encode()
             elif name == "docProps/app.xml":

@@ -14,12 +14,10 @@ from math import isfinite
 from pathlib import Path
 
 from kfsheet.errors import EngineError
-from kfsheet.workbook.engines.shared_formulas import shared
+from kfsheet.workbook.engines.shared_formulas import share_formulas
+from kfsheet.workbook.engines.spreadsheet_engine import Changes
 from kfsheet.workbook.reading.archive import refusing, worksheet_parts
-from kfsheet.workbook.write.finish import untouched
-
-Changes = dict[str, dict[tuple[int, int], float | None]]
-"""Numbers to put into cells before calculating, by sheet and (row, column); None empties one."""
+from kfsheet.workbook.write.reproducible_zip import untouched
 
 PREFIX = re.compile(rb"<(\w+:)?worksheet\b")
 # A value after a formula, or after the empty element of one that is shared. Both patterns begin
@@ -75,7 +73,7 @@ def copy_for_ironcalc(path: str | Path, copy: str | Path) -> None:
     ours = untouched(Path(path))
 
     def rewritten(_: str, xml: bytes) -> bytes:
-        return shared(xml) if ours else _without_values(xml)
+        return share_formulas(xml) if ours else _without_values(xml)
 
     with refusing(path), zipfile.ZipFile(path) as old:
         _copy(old, copy, rewritten)

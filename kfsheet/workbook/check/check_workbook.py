@@ -14,11 +14,17 @@ from pathlib import Path
 
 from kfsheet.model.exercise import Exercise
 from kfsheet.parsing.references import Address
-from kfsheet.workbook.check.frozen import built_from
-from kfsheet.workbook.check.opened import Inputs, Opened, inputs_in, layout_of, place
+from kfsheet.workbook.check.frozen_figures import built_from
+from kfsheet.workbook.check.opened_workbook import (
+    Inputs,
+    OpenedWorkbook,
+    inputs_in,
+    layout_of,
+    place,
+)
 from kfsheet.workbook.check.trials import Foreseen, compared, foreseen, trials_of
 from kfsheet.workbook.write.check_sheet import TOLERANCE, probes
-from kfsheet.workbook.write.contents import Run
+from kfsheet.workbook.write.run import Run
 
 
 @dataclass(frozen=True)
@@ -94,15 +100,15 @@ def check_workbook(path: str | Path, exercise: Exercise, engine: str = "ironcalc
     EngineError
         If the engine cannot do its work.
     """
-    book = Opened(path, engine)
+    book = OpenedWorkbook(path, engine)
     return check(book, exercise, foreseen(book, exercise))
 
 
-def check(book: Opened, exercise: Exercise, ahead: Foreseen) -> Report:
+def check(book: OpenedWorkbook, exercise: Exercise, ahead: Foreseen) -> Report:
     """Compare a workbook that is open in an engine; see :func:`check_workbook`.
 
     ``ahead`` is what :func:`foreseen` gave. The file may hold other inputs, and may have been built
-    from others still; see :mod:`kfsheet.workbook.check.frozen`.
+    from others still; see :mod:`kfsheet.workbook.check.frozen_figures`.
     """
     inputs = inputs_in(book, layout_of(book, exercise))
     same, now = inputs == ahead.inputs, ahead.run

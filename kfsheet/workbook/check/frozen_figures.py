@@ -11,16 +11,16 @@ from collections import Counter
 from collections.abc import Iterator
 
 from kfsheet.errors import DataError
-from kfsheet.workbook.check.opened import Inputs, Opened
+from kfsheet.workbook.check.opened_workbook import Inputs, OpenedWorkbook
 from kfsheet.workbook.write.check_sheet import FIGURES, TABLE_ROW, TOLERANCE, VALUE, probes
-from kfsheet.workbook.write.contents import Run
 from kfsheet.workbook.write.layout import Layout
+from kfsheet.workbook.write.run import Run
 
 Frozen = dict[tuple[str, str], float]
 """Frozen figures by name and kind of figure."""
 
 
-def frozen_figures(book: Opened) -> Frozen:
+def frozen_figures(book: OpenedWorkbook) -> Frozen:
     """Every line of the sheet "Check": its name, its kind of figure, and the number at build."""
     cells = book.values["Check"]
     rows = {row for row, _ in cells if row > TABLE_ROW}
@@ -28,7 +28,7 @@ def frozen_figures(book: Opened) -> Frozen:
     return {key: value for key, value in found.items() if isinstance(value, int | float)}
 
 
-def built_from(book: Opened, inputs: Inputs, default: Run, now: Run) -> Run:
+def built_from(book: OpenedWorkbook, inputs: Inputs, default: Run, now: Run) -> Run:
     """The run that a workbook was built from.
 
     It is the one that agrees with most of the frozen figures: the exercise as it is

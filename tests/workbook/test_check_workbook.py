@@ -10,8 +10,8 @@ from kfsheet.coursework.handout.handouts import solution_bytes
 from kfsheet.coursework.handout.variation import own_numbers
 from kfsheet.exercises import exercise_names, load_exercise
 from kfsheet.exercises.football import exercise
-from kfsheet.workbook.check.opened import Opened
-from kfsheet.workbook.engines.recalculate import open_workbook
+from kfsheet.workbook.check.opened_workbook import OpenedWorkbook
+from kfsheet.workbook.reading.open_workbook import open_workbook
 from kfsheet.workbook.write.check_sheet import TABLE_ROW
 
 
@@ -258,7 +258,7 @@ def test_inserted_columns_and_helper_cells_do_not_disturb(damaged):
 def test_a_workbook_saved_by_libreoffice_still_holds(football_file, tmp_path):
     from conftest import need
 
-    from kfsheet.workbook.engines.recalculate import convert
+    from kfsheet.workbook.engines.libreoffice import convert
 
     need("libreoffice")
     again = convert(football_file, tmp_path, "xlsx:Calc MS Excel 2007 XML")
@@ -349,7 +349,7 @@ def test_what_is_no_workbook_and_what_is_not_ours_is_refused(tmp_path):
     foreign = tmp_path / "foreign.xlsx"
     openpyxl.Workbook().save(foreign)
     with pytest.raises(WorkbookError, match="not one of ours"):
-        Opened(foreign).exercise_name()
+        OpenedWorkbook(foreign).exercise_name()
 
 
 def test_an_unknown_engine_is_refused(football_file):

@@ -21,11 +21,11 @@ from openpyxl.comments import Comment
 from kfsheet import EngineError, WorkbookError
 from kfsheet.coursework.judging.engine import calculated
 from kfsheet.processes import completed
-from kfsheet.workbook.engines.copies import copy_for_ironcalc
+from kfsheet.workbook.engines.copies_for_engines import copy_for_ironcalc
 from kfsheet.workbook.engines.ironcalc import IronCalc
-from kfsheet.workbook.engines.ironcalc_process import Apart
+from kfsheet.workbook.engines.ironcalc_process import IronCalcProcess
 from kfsheet.workbook.engines.recalculate import recalculate
-from kfsheet.workbook.write.finish import untouched
+from kfsheet.workbook.write.reproducible_zip import untouched
 
 FOOTBALL = Path(__file__).parents[2] / "workbooks" / "football.xlsx"
 CANNONBALL = FOOTBALL.with_name("cannonball.xlsx")
@@ -42,35 +42,35 @@ def is_running(process: int) -> bool:
 
 
 def test_a_process_of_its_own_finds_what_this_one_finds_with_other_numbers_too():
-    here, apart = IronCalc(FOOTBALL), Apart(FOOTBALL)
+    here, background = IronCalc(FOOTBALL), IronCalcProcess(FOOTBALL)
     for changes in (None, KICK, None):
-        apart.ask(changes)
-        assert apart.values(changes) == here.values(changes)
+        background.ask(changes)
+        assert background.values(changes) == here.values(changes)
 
 
 def test_questions_that_are_asked_together_do_not_see_each_others_numbers():
-    here, apart = IronCalc(FOOTBALL), Apart(FOOTBALL)
+    here, background = IronCalc(FOOTBALL), IronCalcProcess(FOOTBALL)
     for changes in (KICK, None, HARDER):
-        apart.ask(changes)
+        background.ask(changes)
     for changes in (KICK, None, HARDER):
-        assert apart.values(changes) == here.values(changes)
+        assert background.values(changes) == here.values(changes)
 
 
 def test_what_was_asked_in_vain_is_passed_over():
-    apart = Apart(FOOTBALL)
+    background = IronCalcProcess(FOOTBALL)
     for changes in (KICK, None, HARDER):
-        apart.ask(changes)
-    assert apart.values(HARDER) == IronCalc(FOOTBALL).values(HARDER)
-    assert apart.values() == IronCalc(FOOTBALL).values()
+        background.ask(changes)
+    assert background.values(HARDER) == IronCalc(FOOTBALL).values(HARDER)
+    assert background.values() == IronCalc(FOOTBALL).values()
 
 
 def test_a_question_about_a_worksheet_that_is_not_there_is_an_error_and_the_next_is_answered():
-    apart, elsewhere = Apart(FOOTBALL), {"Elsewhere": {(1, 1): 2.0}}
-    apart.ask(elsewhere)
-    apart.ask(KICK)
+    background, elsewhere = IronCalcProcess(FOOTBALL), {"Elsewhere": {(1, 1): 2.0}}
+    background.ask(elsewhere)
+    background.ask(KICK)
     with pytest.raises(EngineError, match="has no worksheet 'Elsewhere'"):
-        apart.values(elsewhere)
-    assert apart.values(KICK) == IronCalc(FOOTBALL).values(KICK)
+        background.values(elsewhere)
+    assert background.values(KICK) == IronCalc(FOOTBALL).values(KICK)
 
 
 def fail_to_fork(after: int | None) -> None:
@@ -90,9 +90,9 @@ def fail_to_fork(after: int | None) -> None:
 @pytest.mark.parametrize("left", [None, 0, 1], ids=["on Windows", "at all", "after the first"])
 def test_where_nothing_can_be_forked_the_answers_are_the_same(monkeypatch, left):
     def command(module: str, function: str, *arguments: str) -> list[str]:
-        program = "import os, sys; from test_engine import fail_to_fork; "
+        program = "import os, sys; from test_ironcalc_process import fail_to_fork; "
         program += f"fail_to_fork({left}); from {module} import {function} as main; "
-        path = f"sys.path.insert(0, {str(Path(__file__).parents[1])!r}); "
+        path = f"sys.path[:0] = {[str(folder) for folder in Path(__file__).parents[:2]]!r}; "
         return [
             sys.executable,
             "-c",
@@ -101,26 +101,26 @@ def test_where_nothing_can_be_forked_the_answers_are_the_same(monkeypatch, left)
         ]
 
     monkeypatch.setattr("kfsheet.workbook.engines.ironcalc_process.command", command)
-    here, apart = IronCalc(FOOTBALL), Apart(FOOTBALL)
+    here, background = IronCalc(FOOTBALL), IronCalcProcess(FOOTBALL)
     for changes in (None, KICK, HARDER):
-        apart.ask(changes)
+        background.ask(changes)
     for changes in (None, HARDER, KICK):
-        assert apart.values(changes) == here.values(changes)
+        assert background.values(changes) == here.values(changes)
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds a fork as Linux does")
 def test_a_fork_that_dies_is_an_error_and_not_an_answer():
-    apart, number = Apart(CANNONBALL), 0
-    apart.ask()
-    forks = Path(f"/proc/{apart._process.pid}/task/{apart._process.pid}/children")
+    background, number = IronCalcProcess(CANNONBALL), 0
+    background.ask()
+    forks = Path(f"/proc/{background._process.pid}/task/{background._process.pid}/children")
     end = time.monotonic() + 60
     while not number and time.monotonic() < end:
         number = int(forks.read_text() or 0)
     os.kill(number, signal.SIGKILL)
-    apart.ask(KICK)
+    background.ask(KICK)
     for _ in range(2):
         with pytest.raises(EngineError, match="ended while it calculated"):
-            apart.values()
+            background.values()
 
 
 @pytest.mark.parametrize("engine", ["ironcalc", "libreoffice"])
@@ -133,10 +133,10 @@ def test_what_no_cell_can_hold_is_refused(engine, number):
 
 
 def test_after_numbers_that_are_refused_others_are_calculated():
-    apart, odd = Apart(FOOTBALL), {"Parameters": {(5, 2): float("nan"), (0, 0): 1.0}}
+    background, odd = IronCalcProcess(FOOTBALL), {"Parameters": {(5, 2): float("nan"), (0, 0): 1.0}}
     with pytest.raises(EngineError, match="cannot put numbers into"):
-        apart.values(odd)
-    assert apart.values(KICK) == IronCalc(FOOTBALL).values(KICK)
+        background.values(odd)
+    assert background.values(KICK) == IronCalc(FOOTBALL).values(KICK)
 
 
 def test_a_folder_without_room_for_a_copy_is_named(tmp_path):
@@ -164,20 +164,20 @@ def test_a_file_that_only_says_that_it_is_ours_is_read_too(tmp_path):
 
 @pytest.mark.skipif(os.name == "nt", reason="stops a process as Unix does")
 def test_who_is_interrupted_while_waiting_gets_the_right_answer_the_next_time():
-    apart, before = Apart(FOOTBALL), threading.active_count()
-    apart.values()
-    os.kill(apart._process.pid, signal.SIGSTOP)
+    background, before = IronCalcProcess(FOOTBALL), threading.active_count()
+    background.values()
+    os.kill(background._process.pid, signal.SIGSTOP)
     here = threading.get_ident()
     interrupt = threading.Timer(0.5, signal.pthread_kill, [here, signal.SIGINT])
     interrupt.start()
     with pytest.raises(KeyboardInterrupt):
-        apart.values(KICK)
+        background.values(KICK)
     end = time.monotonic() + 10
     while threading.active_count() > before and time.monotonic() < end:
         time.sleep(0.01)
     assert threading.active_count() == before  # no timer, for which the interpreter would wait
-    os.kill(apart._process.pid, signal.SIGCONT)
-    assert apart.values(HARDER) == IronCalc(FOOTBALL).values(HARDER)
+    os.kill(background._process.pid, signal.SIGCONT)
+    assert background.values(HARDER) == IronCalc(FOOTBALL).values(HARDER)
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds a process as Linux does")
@@ -200,43 +200,43 @@ def test_a_command_that_is_ended_leaves_neither_processes_nor_files(tmp_path, nu
 
 
 def test_an_engine_that_ends_is_an_error_in_one_line():
-    apart = Apart(FOOTBALL)
-    apart._process.kill()
-    apart.ask()
+    background = IronCalcProcess(FOOTBALL)
+    background._process.kill()
+    background.ask()
     with pytest.raises(EngineError, match="ended while it calculated"):
-        apart.values()
+        background.values()
 
 
 def test_an_engine_that_takes_too_long_is_stopped(monkeypatch):
     monkeypatch.setattr("kfsheet.workbook.engines.ironcalc_process.TIMEOUT", 0.01)
-    apart = Apart(FOOTBALL)
-    apart.ask()
+    background = IronCalcProcess(FOOTBALL)
+    background.ask()
     with pytest.raises(EngineError, match=r"ended while it calculated .*, after 0.01 s"):
-        apart.values()
+        background.values()
 
 
 def test_a_module_of_the_current_folder_does_not_pass_for_one_of_the_library(tmp_path, monkeypatch):
     (tmp_path / "ironcalc.py").write_text("raise SystemExit('not this one')")
     monkeypatch.chdir(tmp_path)
-    apart = Apart(FOOTBALL)
-    apart.ask()
-    assert apart.values() == IronCalc(FOOTBALL).values()
+    background = IronCalcProcess(FOOTBALL)
+    background.ask()
+    assert background.values() == IronCalc(FOOTBALL).values()
 
 
 def test_what_cannot_be_read_is_said_by_the_process_too(tmp_path):
     path = tmp_path / "a.xlsx"
     path.write_bytes(b"no workbook")
-    apart = Apart(path)
-    apart.ask()
+    background = IronCalcProcess(path)
+    background.ask()
     with pytest.raises(WorkbookError, match="is not a workbook"):
-        apart.values()
+        background.values()
 
 
 def test_an_engine_that_is_no_longer_wanted_is_stopped_at_work():
-    apart = Apart(CANNONBALL)
-    apart.ask()
-    process = apart._process
-    del apart
+    background = IronCalcProcess(CANNONBALL)
+    background.ask()
+    process = background._process
+    del background
     assert process.poll() not in (None, 0)  # 0: it was waited for until it was done
 
 
@@ -247,9 +247,9 @@ def test_what_an_engine_prints_is_no_answer(tmp_path):
     book["Parameters"]["B40"] = datetime.date(2026, 11, 22)
     book.save(tmp_path / "a.xlsx")
     assert b't="d"' in zipfile.ZipFile(tmp_path / "a.xlsx").read("xl/worksheets/sheet2.xml")
-    apart, kick = Apart(tmp_path / "a.xlsx"), ("Parameters", 5, 2)
-    apart.ask(KICK)
-    assert apart.values(KICK)["Parameters"][5, 2] == 25
+    background, kick = IronCalcProcess(tmp_path / "a.xlsx"), ("Parameters", 5, 2)
+    background.ask(KICK)
+    assert background.values(KICK)["Parameters"][5, 2] == 25
     assert calculated(tmp_path / "a.xlsx", [KICK], [kick], 60) == [[25]]
 
 
@@ -258,9 +258,9 @@ def test_an_engine_that_panics_is_an_error_that_names_the_file(tmp_path):
     path = tmp_path / "a.xlsx"
     odd = b'<definedName name="odd" localSheetId="99">Parameters!$B$5</definedName>'
     rewrite(FOOTBALL, path, r"xl/workbook\.xml", rb"<definedNames>", rb"\g<0>" + odd)
-    apart = Apart(path)
-    apart.ask()
-    for compute in (lambda: recalculate(path), apart.values):
+    background = IronCalcProcess(path)
+    background.ask()
+    for compute in (lambda: recalculate(path), background.values):
         with pytest.raises(EngineError, match=f"IronCalc cannot read {re.escape(str(path))}: .+"):
             compute()
 
@@ -271,13 +271,13 @@ def test_an_engine_leaves_no_copy_behind(tmp_path, monkeypatch):
     folder = tmp_path / "copies"
     folder.mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(folder))
-    apart = Apart(path)
-    apart.ask()
+    background = IronCalcProcess(path)
+    background.ask()
     end = time.monotonic() + 60
     while not list(folder.rglob("*.xlsx")) and time.monotonic() < end:
         time.sleep(0.001)
     assert list(folder.rglob("*.xlsx"))
-    del apart
+    del background
     assert not list(folder.iterdir())
 
 

@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from kfsheet.workbook.engines.ironcalc import SheetValues
-from kfsheet.workbook.write.page import Filled
+from kfsheet.workbook.engines.spreadsheet_engine import SheetValues
+from kfsheet.workbook.write.sheet import FilledColumn
 
 NUMBERS = {float, int}  # a text such as "1.0" is none, though NumPy would read it
 
 
-class Whole:
+class ColumnComparison:
     """What is expected of a column whose formulas are where they belong."""
 
-    def __init__(self, filled: Filled, at: int, tolerance: float) -> None:
+    def __init__(self, filled: FilledColumn, at: int, tolerance: float) -> None:
         self._filled, self._tolerance = filled, tolerance
         self._places = list(zip(filled.rows, repeat(at), strict=False))
         self.count = 0
