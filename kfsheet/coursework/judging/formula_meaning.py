@@ -20,16 +20,10 @@ from kfsheet.coursework.reading.worksheet import Formula
 from kfsheet.errors import ForbiddenError, FormulaError
 from kfsheet.model.expressions import Missing, t
 from kfsheet.model.recurrence import Recurrence
-from kfsheet.parsing.formula import (
-    Tree,
-    number,
-    parse_formula,
-    references,
-    relative_tree,
-    tree_to_sympy,
-)
+from kfsheet.parsing.formula import number, references, relative_tree, tree_to_sympy
 from kfsheet.parsing.functions import as_number
 from kfsheet.parsing.references import Address, Reference, relative_key
+from kfsheet.parsing.syntax import Tree, parse_formula
 
 DANGEROUS = frozenset(
     "WEBSERVICE HYPERLINK INDIRECT DDE RTD CALL REGISTER.ID FILTERXML IMAGE IMPORTXML IMPORTDATA "
@@ -74,7 +68,10 @@ class Interpreter:
         if not isinstance(content, Formula):
             return None
         signature = self._signature(address, content, step)
-        return _meaning(self.model, signature)
+        try:
+            return _meaning(self.model, signature)
+        except RecursionError:  # each formula is within limits, long helpers of helpers are not
+            raise FormulaError("the formula with its helper cells is too deep to be read") from None
 
     def _content(self, address: Address):
         sheet, *cell = address
