@@ -8,8 +8,8 @@ from sympy import Indexed
 
 from kfsheet import load_exercise
 from kfsheet.coursework.handout.handouts import handout_pages, own_run
-from kfsheet.coursework.handout.questions import question_pages
-from kfsheet.coursework.handout.variation import own_numbers
+from kfsheet.coursework.handout.own_numbers import own_numbers
+from kfsheet.coursework.handout.questions_sheet import question_pages
 from kfsheet.exercises import exercise_names
 from kfsheet.model.expressions import Missing
 from kfsheet.workbook.write.layout import Layout

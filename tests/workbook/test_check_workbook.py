@@ -7,7 +7,7 @@ import pytest
 
 from kfsheet import DataError, EngineError, WorkbookError, check_workbook, recalculate
 from kfsheet.coursework.handout.handouts import solution_bytes
-from kfsheet.coursework.handout.variation import own_numbers
+from kfsheet.coursework.handout.own_numbers import own_numbers
 from kfsheet.exercises import exercise_names, load_exercise
 from kfsheet.exercises.football import exercise
 from kfsheet.workbook.check.opened_workbook import OpenedWorkbook

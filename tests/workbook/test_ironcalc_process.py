@@ -19,7 +19,7 @@ from conftest import need
 from openpyxl.comments import Comment
 
 from kfsheet import EngineError, WorkbookError
-from kfsheet.coursework.judging.engine import calculated
+from kfsheet.coursework.judging.recalculation_process import calculated
 from kfsheet.processes import completed
 from kfsheet.workbook.engines.copies_for_engines import copy_for_ironcalc
 from kfsheet.workbook.engines.ironcalc import IronCalc

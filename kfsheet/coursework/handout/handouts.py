@@ -16,8 +16,9 @@ from openpyxl.workbook import Workbook
 from openpyxl.worksheet.dimensions import ColumnDimension
 from openpyxl.worksheet.worksheet import Worksheet
 
-from kfsheet.coursework.handout import tokens
-from kfsheet.coursework.handout.questions import (
+from kfsheet.coursework.handout import course_secret
+from kfsheet.coursework.handout.own_numbers import own_numbers
+from kfsheet.coursework.handout.questions_sheet import (
     FIRST,
     HIDDEN,
     LOOKS_RIGHT,
@@ -25,11 +26,10 @@ from kfsheet.coursework.handout.questions import (
     hide,
     question_pages,
 )
-from kfsheet.coursework.handout.variation import own_numbers
 from kfsheet.coursework.judging.judge import asked_steps
-from kfsheet.coursework.judging.workers import Failed, Pool
-from kfsheet.coursework.judging.worlds import Own
-from kfsheet.coursework.reading.belonging import belongs_to, claim
+from kfsheet.coursework.judging.random_samples import OwnNumbers
+from kfsheet.coursework.judging.worker_pool import Failed, Pool
+from kfsheet.coursework.reading.results_folder import belongs_to, claim
 from kfsheet.coursework.reading.roster import Student
 from kfsheet.errors import DataError, ModelError, WorkbookError
 from kfsheet.exercises import load_exercise
@@ -76,7 +76,7 @@ def write_handouts(
     students : list of Student
         Who gets one.
     secret : bytes
-        See :mod:`kfsheet.coursework.handout.tokens`.
+        See :mod:`kfsheet.coursework.handout.course_secret`.
     out : path
         Folder; ``students/ID/EXERCISE.xlsx`` and ``solutions/ID/EXERCISE.xlsx`` are written there.
     jobs : int
@@ -100,7 +100,7 @@ def write_handouts(
     """
     if not exercise.questions:
         raise ModelError(f"{exercise.name} asks no questions; list them in Exercise(questions=...)")
-    if not claim(out, "secret", tokens.fingerprint(secret)):
+    if not claim(out, "secret", course_secret.fingerprint(secret)):
         raise DataError(
             f"{out} holds handouts made with another secret; give that --secret, or another --out"
         )
@@ -139,12 +139,12 @@ def _write_both(
     return write_file(path, content)
 
 
-def own_run(exercise: Exercise, own: Own) -> Run:
+def own_run(exercise: Exercise, own: OwnNumbers) -> Run:
     """The model with a student's numbers."""
     return Run.of(exercise.model, dict(own.data), dict(own.parameters))
 
 
-def solution_bytes(exercise: Exercise, own: Own) -> bytes:
+def solution_bytes(exercise: Exercise, own: OwnNumbers) -> bytes:
     """The complete workbook with a student's numbers."""
     return workbook_bytes(exercise, own_run(exercise, own))
 
@@ -157,7 +157,7 @@ def handout_bytes(exercise: Exercise, student: Student, secret: bytes) -> bytes:
     pages[1:1] = question_pages(exercise, layout, now, secret, (student.id, student.name))
     pages.append(pages.pop(2))  # the hidden sheet last
     book = assemble(exercise, layout, pages, now)
-    _finish_book(book, pages, exercise, tokens.token(secret, exercise.name, student.id))
+    _finish_book(book, pages, exercise, course_secret.token(secret, exercise.name, student.id))
     shell = WorkbookTemplate(book, pages)
     _store(pages, _calculated(shell.filled(pages)))
     return shell.filled(pages)

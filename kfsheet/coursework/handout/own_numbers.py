@@ -6,8 +6,8 @@ from math import floor, isnan, log10
 
 from numpy.random import RandomState
 
-from kfsheet.coursework.handout import tokens
-from kfsheet.coursework.judging.worlds import Own
+from kfsheet.coursework.handout import course_secret
+from kfsheet.coursework.judging.random_samples import OwnNumbers
 from kfsheet.errors import DataError, ModelError
 from kfsheet.evaluation.evaluate import run
 from kfsheet.model.exercise import Exercise
@@ -16,7 +16,7 @@ ATTEMPTS = 20
 FIGURES = 3  # of a varied parameter
 
 
-def own_numbers(exercise: Exercise, secret: bytes, student: str) -> Own:
+def own_numbers(exercise: Exercise, secret: bytes, student: str) -> OwnNumbers:
     """Parameters and data of one student; the same for the same secret, exercise and student.
 
     Raises
@@ -25,7 +25,7 @@ def own_numbers(exercise: Exercise, secret: bytes, student: str) -> Own:
         If the model has no values for what is drawn, twenty times: its ranges are too wide.
     """
     for attempt in range(ATTEMPTS):
-        dice = RandomState(tokens.seed(secret, exercise.name, student, str(attempt)))
+        dice = RandomState(course_secret.seed(secret, exercise.name, student, str(attempt)))
         parameters, data = _drawn(exercise, dice)
         try:
             run(exercise.model, data, parameters)
@@ -56,8 +56,10 @@ def _rounded(value: float, low: float, high: float) -> float:
     return short if low <= short <= high else value
 
 
-def _own(exercise: Exercise, parameters: dict[str, float], data: dict[str, list[float]]) -> Own:
+def _own(
+    exercise: Exercise, parameters: dict[str, float], data: dict[str, list[float]]
+) -> OwnNumbers:
     columns = {c.name: c.values for c in exercise.model.table.values() if c.is_data}
     for name, values in data.items():
         columns[name] = tuple(float("nan") if v is None or isnan(v) else float(v) for v in values)
-    return Own(tuple(parameters.items()), tuple(columns.items()))
+    return OwnNumbers(tuple(parameters.items()), tuple(columns.items()))

@@ -1,9 +1,9 @@
 """Random points at which a student's formula and the key are compared as functions.
 
-A *world* gives every parameter, datum and column of an exercise a random value. In the first kind
+A *sample* gives every parameter, datum and column of an exercise a random value. In the first kind
 every column is drawn independently of all others, so that a formula is judged on its own, whatever
 stands in the columns it reads. A student may also have written a column's formula where the key
-reads the column; so there are worlds in which the columns of the row asked for, and of the one or
+reads the column; so there are samples in which the columns of the row asked for, and of the one or
 two rows before it, follow from earlier rows as the key says. What itself follows from the answer
 stays random there: an answer computed from its own consequences goes in a circle.
 
@@ -19,7 +19,7 @@ from math import exp, isnan
 
 from sympy import Basic
 
-from kfsheet.coursework.judging.arithmetic import MISSING, NoValueError, Value, exact, value_of
+from kfsheet.coursework.judging.precise_values import MISSING, NoValueError, Value, exact, value_of
 from kfsheet.model.quantities import Column, Parameter
 from kfsheet.model.recurrence import Recurrence
 from kfsheet.model.schedule import same_row
@@ -27,42 +27,42 @@ from kfsheet.model.validation import columns_read, scalars
 from kfsheet.workbook.write.run import Run
 
 ALONE = -1
-"""Depth of the worlds in which every column is drawn by itself."""
+"""Depth of the samples in which every column is drawn by itself."""
 DEPTHS = (ALONE, 0, 1, 2)
-WITHOUT_GAPS, WITH_GAPS = 8, 6  # worlds; every other one is wild
+WITHOUT_GAPS, WITH_GAPS = 8, 6  # samples; every other one is wild
 SPREAD = 0.3  # of a value about the one in the model's own run
 
 
 @dataclass(frozen=True)
-class Own:
-    """A student's own parameters and data, where a world is to have those."""
+class OwnNumbers:
+    """A student's own parameters and data, where a sample is to have those."""
 
     parameters: tuple[tuple[str, float], ...] = ()
     data: tuple[tuple[str, tuple[float, ...]], ...] = ()
 
 
-NOBODY = Own()
+NOBODY = OwnNumbers()
 
 
-class World:
+class Sample:
     """One random point for the formulas of one question in one row."""
 
     def __init__(
         self,
-        scene: Scene,
+        sampler: Sampler,
         row: int,
         depth: int,
         number: int,
         blocked: frozenset[str] = frozenset(),
-        own: Own = Own(),
+        own: OwnNumbers = OwnNumbers(),
     ) -> None:
-        self._scene, self.row, self.depth, self._blocked = scene, row, depth, blocked
+        self._sampler, self.row, self.depth, self._blocked = sampler, row, depth, blocked
         self.wild, self.gaps = number % 2 == 1, number >= WITHOUT_GAPS
         self._empty = number in (WITHOUT_GAPS, WITHOUT_GAPS + 1)
         self._number = number
         self._own = dict(own.parameters)
         self._own_data = dict(own.data)
-        self._seed = f"{scene.model.name}/{number}"
+        self._seed = f"{sampler.model.name}/{number}"
         self._known: dict[tuple[str, int], Value | NoValueError] = {}
 
     def __call__(self, name: str, row: int) -> Value:
@@ -80,13 +80,13 @@ class World:
         return found
 
     def _computed(self, name: str, row: int) -> Value:
-        model = self._scene.model
+        model = self._sampler.model
         if name in model.parameters:
             return self._parameter(model.parameters[name])
         if name in model.derived_scalars and self.depth > ALONE and name not in self._blocked:
             return value_of(model.derived_scalars[name].expression, self, row)
         if name in model.derived_scalars or name in model.summaries:
-            return self._drawn(name, 0, [self._scene.base.scalars[name]])
+            return self._drawn(name, 0, [self._sampler.base.scalars[name]])
         column = model.column(name)
         if not 0 <= row < model.rows:
             return MISSING  # the header above the table, or an empty cell below
@@ -103,7 +103,7 @@ class World:
             return value_of(column.definition(row), self, row)
         if column.gap_possible(range(row, row + 1)) and self._gap(name, row):
             return MISSING
-        return self._drawn(name, row, self._scene.base.columns[name])
+        return self._drawn(name, row, self._sampler.base.columns[name])
 
     def _datum(self, column: Column, row: int) -> Value:
         if column.name in self._own_data:
@@ -111,19 +111,19 @@ class World:
             return None if isnan(value) else exact(value)
         if column.may_be_missing and self._gap(column.name, row):
             return None
-        return self._drawn(column.name, row, self._scene.base.columns[column.name])
+        return self._drawn(column.name, row, self._sampler.base.columns[column.name])
 
     def _random(self, name: str, row: int) -> random.Random:
         return random.Random(f"{self._seed}/{name}/{row}")
 
     def _gap(self, name: str, row: int) -> bool:
-        """Nothing is observed in the first of the worlds with gaps, half of it in the others."""
+        """Nothing is observed in the first of the samples with gaps, half of it in the others."""
         return self.gaps and (self._empty or self._random(f"gap {name}", row).random() < 0.5)
 
     def _sign(self, name: str, row: int) -> int:
-        """Either sign in two of four neighbouring worlds of a kind, in an order of its own."""
+        """Either sign in two of four neighbouring samples of a kind, in an order of its own."""
         signs = [1, 1, -1, -1]
-        random.Random(f"{self._scene.model.name}/{name}/{row}").shuffle(signs)
+        random.Random(f"{self._sampler.model.name}/{name}/{row}").shuffle(signs)
         return signs[self._number // 2 % 4]
 
     def _parameter(self, parameter: Parameter) -> Value:
@@ -136,7 +136,7 @@ class World:
 
     def _drawn(self, name: str, row: int, base: list[float]) -> Value:
         """Near the model's own run, or anywhere in the column's range, with either sign."""
-        dice, largest, few = self._random(name, row), *self._scene.range(name, base)
+        dice, largest, few = self._random(name, row), *self._sampler.range(name, base)
         if few:
             return exact(dice.choice(few))
         own = base[row] if row < len(base) else 0.0
@@ -145,13 +145,13 @@ class World:
         return exact(own * exp(dice.gauss(0, SPREAD)))
 
 
-class Scene:
-    """What all worlds of an exercise share: its model and one run of it."""
+class Sampler:
+    """What all samples of an exercise share: its model and one run of it."""
 
     def __init__(self, model: Recurrence) -> None:
         self.model = model
         self._ranges: dict[str, tuple[float, list[float]]] = {}
-        self._worlds: dict[tuple, list[World]] = {}
+        self._samples: dict[tuple, list[Sample]] = {}
 
     @cached_property
     def base(self) -> Run:
@@ -167,19 +167,19 @@ class Scene:
             self._ranges[name] = (largest, sorted(values) if few and len(values) > 1 else [])
         return self._ranges[name]
 
-    def worlds(self, name: str, row: int, depth: int, own: Own = NOBODY) -> list[World]:
-        """Worlds for the formulas of one question in one row; those without gaps come first."""
+    def samples(self, name: str, row: int, depth: int, own: OwnNumbers = NOBODY) -> list[Sample]:
+        """Samples for the formulas of one question in one row; those without gaps come first."""
         key = (name, row, depth, own)
-        if key not in self._worlds:
-            if len(self._worlds) > 2_000:
-                self._worlds.clear()
+        if key not in self._samples:
+            if len(self._samples) > 2_000:
+                self._samples.clear()
             gaps = any(c.may_be_missing for c in self.model.all_columns())
             count = WITHOUT_GAPS + WITH_GAPS * gaps
             blocked = self.consequences(name)
-            self._worlds[key] = [World(self, row, depth, n, blocked, own) for n in range(count)]
-        return self._worlds[key]
+            self._samples[key] = [Sample(self, row, depth, n, blocked, own) for n in range(count)]
+        return self._samples[key]
 
-    @lru_cache(maxsize=256)  # noqa: B019 - scenes live as long as the process
+    @lru_cache(maxsize=256)  # noqa: B019 - samplers live as long as the process
     def consequences(self, name: str) -> frozenset[str]:
         """What follows from a column in its own row, itself included; of a scalar, everything."""
         found = {name}

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 from openpyxl.utils import get_column_letter
 
+from kfsheet.coursework.judging.formula_meaning import Interpreter, Meaning
 from kfsheet.coursework.judging.judge import asked_steps
-from kfsheet.coursework.judging.meaning import Interpreter, Meaning
-from kfsheet.coursework.judging.worlds import Own
-from kfsheet.coursework.reading.places import Places
+from kfsheet.coursework.judging.random_samples import OwnNumbers
+from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.coursework.reading.submission import Book
 from kfsheet.coursework.reading.worksheet import Content, Formula
 from kfsheet.errors import FormulaError
@@ -23,15 +23,17 @@ from kfsheet.workbook.write.layout import Layout
 from kfsheet.workbook.write.run import Run
 from kfsheet.workbook.write.sheet import Cell, is_formula
 
-SAMPLE = 40  # rows of a long table that are looked at
+ROWS_CHECKED = 40  # rows of a long table that are looked at
 
 
-def edits(exercise: Exercise, book: Book, places: Places, own: Own) -> list[str]:
+def changed_cells(
+    exercise: Exercise, book: Book, addresses: CellAddresses, own: OwnNumbers
+) -> list[str]:
     """Names of parameters, data and given columns that differ from what was handed out."""
     return [
-        *_parameters(book, places, own),
-        *_data(exercise, book, places, own),
-        *_formulas(exercise, book, places),
+        *_parameters(book, addresses, own),
+        *_data(exercise, book, addresses, own),
+        *_formulas(exercise, book, addresses),
     ]
 
 
@@ -45,31 +47,33 @@ def _same(found: Content | None, wanted: float) -> bool:
     return type(found) is float and isclose(found, wanted, rel_tol=1e-9)
 
 
-def _parameters(book: Book, places: Places, own: Own) -> Iterator[str]:
+def _parameters(book: Book, addresses: CellAddresses, own: OwnNumbers) -> Iterator[str]:
     for name, value in own.parameters:
-        if not _same(_content(book, places.address(name)), value):
+        if not _same(_content(book, addresses.of(name)), value):
             yield name
 
 
-def _data(exercise: Exercise, book: Book, places: Places, own: Own) -> Iterator[str]:
+def _data(
+    exercise: Exercise, book: Book, addresses: CellAddresses, own: OwnNumbers
+) -> Iterator[str]:
     for name, values in own.data:
-        found = (_content(book, places.address(name, step)) for step in range(exercise.model.rows))
+        found = (_content(book, addresses.of(name, step)) for step in range(exercise.model.rows))
         if not all(map(_same, found, values)):
             yield name
 
 
-def _formulas(exercise: Exercise, book: Book, places: Places) -> Iterator[str]:
+def _formulas(exercise: Exercise, book: Book, addresses: CellAddresses) -> Iterator[str]:
     asked = {q.name for q in exercise.questions}
-    interpreter = Interpreter(book, places)
+    interpreter = Interpreter(book, addresses)
     original = _original(exercise)
-    unmoved = original.places.tables == places.tables
-    unmoved &= original.places.scalars == places.scalars
+    unmoved = original.addresses.tables == addresses.tables
+    unmoved &= original.addresses.scalars == addresses.scalars
     for column in exercise.model.table.values():
         if column.is_data or column.name in asked or column.section in exercise.frozen:
             continue
         steps = asked_steps(exercise.model, column.name)
-        for step in steps[:: max(1, len(steps) // SAMPLE)]:
-            found = places.address(column.name, step)
+        for step in steps[:: max(1, len(steps) // ROWS_CHECKED)]:
+            found = addresses.of(column.name, step)
             if unmoved and _same_text(_content(book, found), _content(original.book, found)):
                 continue  # what it means needs no look
             wanted = _given(exercise.name, column.name, step)
@@ -93,14 +97,14 @@ def _same_text(found: Content | None, given: Content | None) -> bool:
 def _given(exercise: str, column: str, step: int) -> Meaning | None:
     """What a cell meant when it was handed out."""
     original = _originals[exercise]
-    return original.interpreter.meaning(original.places.address(column, step), step)
+    return original.interpreter.meaning(original.addresses.of(column, step), step)
 
 
 class _Original(NamedTuple):
     """The tables as they are handed out, to be read like those that come back."""
 
     book: Book
-    places: Places
+    addresses: CellAddresses
     interpreter: Interpreter
 
 
@@ -120,8 +124,8 @@ def _original(exercise: Exercise) -> _Original:
             }
         book.sheets["Parameters"] = {}
         book.names = {n.lower(): _reference(address) for n, address in layout.scalars.items()}
-        places = Places.find(book, exercise.model)
-        _originals[exercise.name] = _Original(book, places, Interpreter(book, places))
+        addresses = CellAddresses.find(book, exercise.model)
+        _originals[exercise.name] = _Original(book, addresses, Interpreter(book, addresses))
     return _originals[exercise.name]
 
 

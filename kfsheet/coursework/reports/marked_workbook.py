@@ -17,7 +17,7 @@ from xml.sax.saxutils import escape
 from openpyxl.utils import get_column_letter
 
 from kfsheet.coursework.judging.judge import Mark
-from kfsheet.coursework.reading.places import Places
+from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.coursework.reading.submission import Book
 from kfsheet.errors import WorkbookError
 from kfsheet.parsing.references import Address
@@ -37,7 +37,11 @@ def colour_of(mark: Mark) -> str:
 
 
 def mark_workbook(
-    path: Path, book: Book, places: Places, marks: Sequence[Mark], total: float | None = None
+    path: Path,
+    book: Book,
+    addresses: CellAddresses,
+    marks: Sequence[Mark],
+    total: float | None = None,
 ) -> bytes:
     """The workbook at ``path`` with marks beside the answers and on a sheet of their own.
 
@@ -65,7 +69,7 @@ def mark_workbook(
                 f'<Override PartName="/{PART}" ContentType="{CONTENT}"/>',
             ),
         }
-        for sheet, cells in _headings(places, marks).items():
+        for sheet, cells in _headings(addresses, marks).items():
             part = book.parts[sheet]
             changed[part] = _with_words(old.read(part).decode(), cells, numbers)
         for item in old.infolist():
@@ -119,22 +123,22 @@ def _with_sheet(xml: str, sheets: object) -> str:
     return _before(xml, "</sheets>", new)
 
 
-def _headings(places: Places, marks: Sequence[Mark]) -> dict[str, dict[str, Mark]]:
+def _headings(addresses: CellAddresses, marks: Sequence[Mark]) -> dict[str, dict[str, Mark]]:
     """The cell above each column of answers, or to the right of a scalar, by sheet."""
     found: dict[str, dict[str, Mark]] = {}
     for mark in marks:
-        address = _heading(places, mark.name)
+        address = _heading(addresses, mark.name)
         if address:
             sheet, row, column = address
             found.setdefault(sheet, {})[f"{get_column_letter(column)}{row}"] = mark
     return found
 
 
-def _heading(places: Places, name: str) -> Address | None:
-    if name in places.columns:
-        table, column = places.columns[name]
+def _heading(addresses: CellAddresses, name: str) -> Address | None:
+    if name in addresses.columns:
+        table, column = addresses.columns[name]
         return table.sheet, table.header + 2, column
-    address = places.address(name)
+    address = addresses.of(name)
     return address and (address[0], address[1], address[2] + 2)
 
 

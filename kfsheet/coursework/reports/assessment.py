@@ -7,17 +7,17 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from kfsheet.coursework.handout import tokens
+from kfsheet.coursework.handout import course_secret
 from kfsheet.coursework.handout.handouts import TOKEN_PROPERTY
-from kfsheet.coursework.handout.variation import own_numbers
+from kfsheet.coursework.handout.own_numbers import own_numbers
+from kfsheet.coursework.judging.changed_cells import changed_cells
 from kfsheet.coursework.judging.diagnosis import EMPTY
-from kfsheet.coursework.judging.edits import edits
 from kfsheet.coursework.judging.judge import Judge, Mark
-from kfsheet.coursework.judging.recalculating import Recalculation
-from kfsheet.coursework.judging.worlds import Scene
-from kfsheet.coursework.reading.places import named_cell
+from kfsheet.coursework.judging.random_samples import Sampler
+from kfsheet.coursework.judging.recalculated_answers import Recalculation
+from kfsheet.coursework.reading.cell_addresses import named_cell
 from kfsheet.coursework.reading.submission import Book, read_submission
-from kfsheet.coursework.reports.marking import mark_workbook
+from kfsheet.coursework.reports.marked_workbook import mark_workbook
 from kfsheet.errors import KfsheetError, SubmissionError
 from kfsheet.exercises import load_exercise
 from kfsheet.files import write_file
@@ -57,10 +57,10 @@ class Assessment:
 
 
 @lru_cache(maxsize=4)
-def prepared(spec: str) -> tuple[Exercise, Scene]:
+def prepared(spec: str) -> tuple[Exercise, Sampler]:
     """An exercise and its random points, made once in a process."""
     exercise = load_exercise(spec)
-    return exercise, Scene(exercise.model)
+    return exercise, Sampler(exercise.model)
 
 
 def assess(spec: str, secret: bytes, path: Path, copy: Path | None = None) -> Assessment:
@@ -77,11 +77,11 @@ def assess(spec: str, secret: bytes, path: Path, copy: Path | None = None) -> As
     copy : Path, optional
         Where the marked copy of the workbook goes.
     """
-    exercise, scene = prepared(spec)
+    exercise, sampler = prepared(spec)
     try:
         book = read_submission(path)
         student = _student(book, exercise, secret)
-        return _assessed(exercise, scene, secret, path, book, student, copy)
+        return _assessed(exercise, sampler, secret, path, book, student, copy)
     except SubmissionError as error:
         return Assessment(error.status, error.remark)
     except MemoryError:
@@ -94,7 +94,7 @@ def _student(book: Book, exercise: Exercise, secret: bytes) -> str:
     found = [
         token
         for text in (cell, book.properties.get(TOKEN_PROPERTY))
-        if isinstance(text, str) and (token := tokens.read_token(secret, text))
+        if isinstance(text, str) and (token := course_secret.read_token(secret, text))
     ]
     if not found:
         raise SubmissionError(NO_TOKEN, "the file was not handed out, or lost its token")
@@ -108,7 +108,7 @@ def _student(book: Book, exercise: Exercise, secret: bytes) -> str:
 
 def _assessed(
     exercise: Exercise,
-    scene: Scene,
+    sampler: Sampler,
     secret: bytes,
     path: Path,
     book: Book,
@@ -116,17 +116,17 @@ def _assessed(
     copy: Path | None,
 ) -> Assessment:
     own = own_numbers(exercise, secret, student)
-    recalculation = Recalculation(path, scene)
+    recalculation = Recalculation(path, sampler)
 
     def asked(name: str) -> dict[int, bool]:
-        return recalculation(judge.places, name)
+        return recalculation(judge.addresses, name)
 
-    judge = Judge(exercise, scene, book, own, asked)
+    judge = Judge(exercise, sampler, book, own, asked)
     marks = judge.marks()
     if all(mark.status == EMPTY for mark in marks):
         return Assessment(UNTOUCHED, "no answer was filled in", student, marks)
     remarks = list(book.remarks)
-    if changed := edits(exercise, book, judge.places, own):
+    if changed := changed_cells(exercise, book, judge.addresses, own):
         remarks.append(f"locked cells were changed ({', '.join(changed[:6])}); marks ignore that")
     if recalculation.late:
         remarks.append("there was no time to calculate all answers; grade again to try once more")
@@ -140,7 +140,7 @@ def _assessed(
 def _write_copy(path: Path, copy: Path, judge: Judge, result: Assessment) -> bool:
     """The student's own workbook with marks; a file too odd for that goes without."""
     try:
-        write_file(copy, mark_workbook(path, judge.book, judge.places, result.marks))
+        write_file(copy, mark_workbook(path, judge.book, judge.addresses, result.marks))
     except (KfsheetError, ValueError, KeyError):
         return False
     return True

@@ -31,7 +31,7 @@ def calculated(
         If the engine fails or takes longer than ``seconds``.
     """
     asked = pickle.dumps((str(path), list(trials), list(cells)))
-    program = command("kfsheet.coursework.judging.engine", "main")
+    program = command("kfsheet.coursework.judging.recalculation_process", "main")
     try:
         done = subprocess.run(program, input=asked, capture_output=True, timeout=seconds)
     except subprocess.TimeoutExpired:

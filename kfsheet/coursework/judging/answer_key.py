@@ -8,9 +8,15 @@ from weakref import WeakKeyDictionary
 
 from sympy import Basic
 
-from kfsheet.coursework.judging import arithmetic
-from kfsheet.coursework.judging.arithmetic import MISSING, NoValueError, Value, is_real, value_of
-from kfsheet.coursework.judging.worlds import DEPTHS, NOBODY, Own, Scene, World
+from kfsheet.coursework.judging import precise_values
+from kfsheet.coursework.judging.precise_values import (
+    MISSING,
+    NoValueError,
+    Value,
+    is_real,
+    value_of,
+)
+from kfsheet.coursework.judging.random_samples import DEPTHS, NOBODY, OwnNumbers, Sample, Sampler
 
 TOLERANCE = 1e-12
 TINY = 1e-20
@@ -21,10 +27,10 @@ ENOUGH = 2
 ERROR = "error"
 
 
-def worth(expression: Basic, world: World) -> Value | str:
-    """Value of an expression in a world; ERROR where a spreadsheet would show an error."""
+def value_at(expression: Basic, sample: Sample) -> Value | str:
+    """Value of an expression in a sample; ERROR where a spreadsheet would show an error."""
     try:
-        return value_of(expression, world, world.row)
+        return value_of(expression, sample, sample.row)
     except (NoValueError, RecursionError):
         return ERROR
 
@@ -36,59 +42,59 @@ def difference(found: Value | str, wanted: Value | str) -> float | None:
         return 0.0 if found is wanted else float("inf") if wanted is MISSING else None
     if not all(numbers):
         return float("inf")
-    far = arithmetic.size(arithmetic.difference(found, wanted))
+    far = precise_values.size(precise_values.difference(found, wanted))
     return 0.0 if far <= TINY else float(far / max(abs(found), abs(wanted)))
 
 
-class Question:
-    """The key of one question in one row, at all its points."""
+class AnswerKey:
+    """The key of one question in one row, at all its samples."""
 
-    def __init__(self, scene: Scene, name: str, row: int) -> None:
-        self.scene, self.name, self.row = scene, name, row
-        scalar = scene.model.derived_scalars.get(name)
-        self.key = scalar.expression if scalar else scene.model.column(name).definition(row)
-        self._wanted: WeakKeyDictionary[World, Value | str] = WeakKeyDictionary()
+    def __init__(self, sampler: Sampler, name: str, row: int) -> None:
+        self.sampler, self.name, self.row = sampler, name, row
+        scalar = sampler.model.derived_scalars.get(name)
+        self.key = scalar.expression if scalar else sampler.model.column(name).definition(row)
+        self._wanted: WeakKeyDictionary[Sample, Value | str] = WeakKeyDictionary()
 
-    def worlds(self, depth: int, own: Own = NOBODY) -> list[World]:
+    def samples(self, depth: int, own: OwnNumbers = NOBODY) -> list[Sample]:
         """The points at which formulas are compared."""
-        return self.scene.worlds(self.name, self.row, depth, own)
+        return self.sampler.samples(self.name, self.row, depth, own)
 
-    def wanted(self, world: World) -> Value | str:
+    def wanted(self, sample: Sample) -> Value | str:
         """Value of the key; most wrong formulas are found out at the first point."""
-        if world not in self._wanted:
-            self._wanted[world] = worth(self.key, world)
-        return self._wanted[world]
+        if sample not in self._wanted:
+            self._wanted[sample] = value_at(self.key, sample)
+        return self._wanted[sample]
 
     def differences(
         self,
         expression: Basic,
         depth: int,
-        own: Own = NOBODY,
+        own: OwnNumbers = NOBODY,
         gaps: bool = True,
     ) -> Iterator[float]:
         """Relative differences at the points that can tell something."""
-        for world in self.worlds(depth, own):
-            if world.gaps and not gaps:
+        for sample in self.samples(depth, own):
+            if sample.gaps and not gaps:
                 continue
-            found = worth(expression, world)
-            if world.wild and found is ERROR:
+            found = value_at(expression, sample)
+            if sample.wild and found is ERROR:
                 continue  # beyond the range for which the formula is meant
-            if (far := difference(found, self.wanted(world))) is not None:
+            if (far := difference(found, self.wanted(sample))) is not None:
                 yield far
 
-    def same(self, expression: Basic, own: Own = NOBODY, gaps: bool = True) -> bool:
+    def same(self, expression: Basic, own: OwnNumbers = NOBODY, gaps: bool = True) -> bool:
         """Whether an expression is the key's function, alone or with what the key builds on."""
         if expression == self.key:
             return True
         return any(self._agrees(expression, depth, own, gaps) for depth in DEPTHS)
 
-    def _agrees(self, expression: Basic, depth: int, own: Own, gaps: bool) -> bool:
+    def _agrees(self, expression: Basic, depth: int, own: OwnNumbers, gaps: bool) -> bool:
         count = 0
         for far in self.differences(expression, depth, own, gaps):
             if far > TOLERANCE:
                 return False
             count += 1
-        wanted = (self.wanted(world) for world in self.worlds(depth, own))
+        wanted = (self.wanted(sample) for sample in self.samples(depth, own))
         numbers = sum(map(is_real, wanted))
         return count >= ENOUGH and numbers >= ENOUGH
 
@@ -102,12 +108,12 @@ class Question:
 
     def values(self, expression: Basic) -> tuple[str, ...]:
         """Values at the points without gaps, to 10 figures: the same for the same function."""
-        worlds = [w for w in self.worlds(DEPTHS[0]) if not w.gaps]
-        found = (worth(expression, world) for world in worlds)
+        samples = [w for w in self.samples(DEPTHS[0]) if not w.gaps]
+        found = (value_at(expression, sample) for sample in samples)
         return tuple(f"{float(v):.10g}" if is_real(v) else str(v) for v in found)
 
 
 @lru_cache(maxsize=4_096)
-def question(scene: Scene, name: str, row: int) -> Question:
+def answer_key(sampler: Sampler, name: str, row: int) -> AnswerKey:
     """The question ``name`` in one row, made once."""
-    return Question(scene, name, row)
+    return AnswerKey(sampler, name, row)

@@ -14,9 +14,9 @@ from typing import Any
 
 from sympy import Basic, Dummy, Expr, Indexed, Symbol
 
-from kfsheet.coursework.judging.arithmetic import MISSING, cell_of
-from kfsheet.coursework.judging.comparing import ERROR, worth
-from kfsheet.coursework.judging.worlds import ALONE, Scene, World
+from kfsheet.coursework.judging.answer_key import ERROR, value_at
+from kfsheet.coursework.judging.precise_values import MISSING, cell_of
+from kfsheet.coursework.judging.random_samples import ALONE, Sample, Sampler
 from kfsheet.errors import ModelError
 from kfsheet.files import write_file
 from kfsheet.model.exercise import Exercise, Question
@@ -124,26 +124,26 @@ def _with_arguments(key: Expr) -> tuple[Expr, dict[Basic, str]]:
 
 
 def _tests(exercise: Exercise, name: str, key: Expr, names: dict[Basic, str]) -> Iterator[str]:
-    scene = Scene(exercise.model)
+    sampler = Sampler(exercise.model)
     row, number, count = exercise.model.rows // 2, 0, 0
     while count < POINTS_SHOWN + POINTS_HIDDEN and number < 60:
-        world = World(scene, row, ALONE, number)
+        sample = Sample(sampler, row, ALONE, number)
         number += 1
-        wanted = worth(key, world)
+        wanted = value_at(key, sample)
         if wanted is ERROR:
             continue
         count += 1
-        given = ", ".join(_number(_at(world, node, row)) for node in names)
+        given = ", ".join(_number(_at(sample, node, row)) for node in names)
         yield f"assert close({name}({given}), {_number(wanted)})"
 
 
-def _at(world: World, node: Basic, row: int) -> Any:
+def _at(sample: Sample, node: Basic, row: int) -> Any:
     if node == t:
         return row
     if node.is_Symbol:
-        return world(node.name, 0)
+        return sample(node.name, 0)
     name, fixed, place = cell_of(node)
-    return world(name, place if fixed else row - place)
+    return sample(name, place if fixed else row - place)
 
 
 def _number(value: Any) -> str:

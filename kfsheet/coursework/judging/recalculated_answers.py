@@ -11,17 +11,17 @@ import time
 from functools import lru_cache
 from pathlib import Path
 
-from kfsheet.coursework.judging.arithmetic import MISSING, Value, exact, is_real
-from kfsheet.coursework.judging.comparing import ERROR, difference, question, worth
-from kfsheet.coursework.judging.engine import calculated
+from kfsheet.coursework.judging.answer_key import ERROR, answer_key, difference, value_at
 from kfsheet.coursework.judging.judge import asked_steps
-from kfsheet.coursework.judging.worlds import ALONE, Scene, World
-from kfsheet.coursework.reading.places import Places
+from kfsheet.coursework.judging.precise_values import MISSING, Value, exact, is_real
+from kfsheet.coursework.judging.random_samples import ALONE, Sample, Sampler
+from kfsheet.coursework.judging.recalculation_process import calculated
+from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.errors import KfsheetError
 from kfsheet.workbook.engines.spreadsheet_engine import CellValue, Changes
 
 RUNS = (0, 2, 4, 6, 1, 3)
-"""Numbers of the worlds: four near the model's own run, two anywhere."""
+"""Numbers of the samples: four near the model's own run, two anywhere."""
 HUGE = 1e12  # where a column feeds itself with numbers from anywhere, it may grow beyond sense
 TOLERANCE = 1e-9
 SECONDS = 60.0  # of an engine's time for one workbook, all answers together
@@ -32,18 +32,18 @@ FEWEST = 3
 class Recalculation:
     """Asks an engine about one workbook, as long as its time lasts."""
 
-    def __init__(self, path: Path, scene: Scene) -> None:
-        self._path, self._scene, self._left = path, scene, SECONDS
+    def __init__(self, path: Path, sampler: Sampler) -> None:
+        self._path, self._sampler, self._left = path, sampler, SECONDS
         self.late = False
         """Whether an answer was not judged because there was no time."""
 
-    def __call__(self, places: Places, name: str) -> dict[int, bool]:
+    def __call__(self, addresses: CellAddresses, name: str) -> dict[int, bool]:
         """Whether each step of an answer has the key's value in every run; {} if none can tell."""
-        scene, began = self._scene, time.monotonic()
-        steps = asked_steps(scene.model, name)
-        cells = {step: places.address(name, step) for step in steps}
-        worlds = [_world(scene, number) for number in RUNS]
-        trials = [_changes(scene, places, name, world) for world in worlds]
+        sampler, began = self._sampler, time.monotonic()
+        steps = asked_steps(sampler.model, name)
+        cells = {step: addresses.of(name, step) for step in steps}
+        samples = [_sample(sampler, number) for number in RUNS]
+        trials = [_changes(sampler, addresses, name, sample) for sample in samples]
         try:
             found = calculated(self._path, trials, list(cells.values()), self._left)
         except KfsheetError:
@@ -52,15 +52,15 @@ class Recalculation:
         finally:
             self._left = max(1.0, self._left - (time.monotonic() - began))
         good, counts = dict.fromkeys(steps, True), dict.fromkeys(steps, 0)
-        for world, values in zip(worlds, found, strict=True):
-            live = _Live(world, dict(zip(steps, values, strict=True)), name)
+        for sample, values in zip(samples, found, strict=True):
+            live = _Live(sample, dict(zip(steps, values, strict=True)), name)
             for step in steps:
                 live.row = step
-                wanted = worth(question(scene, name, step).key, live)
+                wanted = value_at(answer_key(sampler, name, step).key, live)
                 far = difference(live.found(step), wanted)
                 senseless = is_real(wanted) and abs(wanted) > HUGE
                 if far is None or (
-                    world.wild and (ERROR in (live.found(step), wanted) or senseless)
+                    sample.wild and (ERROR in (live.found(step), wanted) or senseless)
                 ):
                     continue
                 good[step] &= far <= TOLERANCE
@@ -69,14 +69,14 @@ class Recalculation:
 
 
 @lru_cache(maxsize=len(RUNS))
-def _world(scene: Scene, number: int) -> World:
-    return World(scene, 0, ALONE, number)
+def _sample(sampler: Sampler, number: int) -> Sample:
+    return Sample(sampler, 0, ALONE, number)
 
 
-def _changes(scene: Scene, places: Places, name: str, world: World) -> Changes:
+def _changes(sampler: Sampler, addresses: CellAddresses, name: str, sample: Sample) -> Changes:
     """Random numbers for every cell of the model but those of the answer itself."""
     changes: Changes = {}
-    model = scene.model
+    model = sampler.model
 
     def put(address: tuple[str, int, int] | None, value: Value) -> None:
         if address:
@@ -85,25 +85,25 @@ def _changes(scene: Scene, places: Places, name: str, world: World) -> Changes:
 
     for other in (*model.parameters, *model.derived_scalars):
         if other != name:
-            put(places.address(other), world(other, 0))
+            put(addresses.of(other), sample(other, 0))
     for column in model.table.values():
         if column.name != name:
             for step in range(model.rows):
-                put(places.address(column.name, step), world(column.name, step))
+                put(addresses.of(column.name, step), sample(column.name, step))
     return changes
 
 
 class _Live:
-    """A world in which the answer's own column holds what the engine found."""
+    """A sample in which the answer's own column holds what the engine found."""
 
     wild = gaps = False
 
-    def __init__(self, world: World, values: dict[int, CellValue], name: str) -> None:
-        self._world, self._values, self._name = world, values, name
+    def __init__(self, sample: Sample, values: dict[int, CellValue], name: str) -> None:
+        self._sample, self._values, self._name = sample, values, name
         self.row = 0
 
     def __call__(self, name: str, row: int) -> Value:
-        return self.found(row) if name == self._name else self._world(name, row)
+        return self.found(row) if name == self._name else self._sample(name, row)
 
     def found(self, step: int) -> Value | str:
         """What the engine found in a cell of the answer."""

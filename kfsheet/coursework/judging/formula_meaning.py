@@ -14,22 +14,16 @@ from typing import NamedTuple
 
 from sympy import Basic, Integer, S
 
-from kfsheet.coursework.reading.places import Places, find_sheet
+from kfsheet.coursework.reading.cell_addresses import CellAddresses, find_sheet
 from kfsheet.coursework.reading.submission import Book
 from kfsheet.coursework.reading.worksheet import Formula
 from kfsheet.errors import ForbiddenError, FormulaError
 from kfsheet.model.expressions import Missing, t
 from kfsheet.model.recurrence import Recurrence
-from kfsheet.parsing.formula import (
-    Tree,
-    number,
-    parse_formula,
-    references,
-    relative_tree,
-    tree_to_sympy,
-)
+from kfsheet.parsing.formula import number, references, relative_tree, tree_to_sympy
 from kfsheet.parsing.functions import as_number
 from kfsheet.parsing.references import Address, Reference, relative_key
+from kfsheet.parsing.syntax import Tree, parse_formula
 
 DANGEROUS = frozenset(
     "WEBSERVICE HYPERLINK INDIRECT DDE RTD CALL REGISTER.ID FILTERXML IMAGE IMPORTXML IMPORTDATA "
@@ -54,8 +48,8 @@ class Meaning(NamedTuple):
 class Interpreter:
     """Reads the formulas of one workbook."""
 
-    def __init__(self, book: Book, places: Places) -> None:
-        self._book, self._places, self.model = book, places, places.model
+    def __init__(self, book: Book, addresses: CellAddresses) -> None:
+        self._book, self._addresses, self.model = book, addresses, addresses.model
         self._open: list[Address] = []
         self._sizes: dict[Slot, int] = {}
         self._scalars: dict[str, Slot] = {}  # names that stand for one, whatever the row
@@ -74,7 +68,10 @@ class Interpreter:
         if not isinstance(content, Formula):
             return None
         signature = self._signature(address, content, step)
-        return _meaning(self.model, signature)
+        try:
+            return _meaning(self.model, signature)
+        except RecursionError:  # each formula is within limits, long helpers of helpers are not
+            raise FormulaError("the formula with its helper cells is too deep to be read") from None
 
     def _content(self, address: Address):
         sheet, *cell = address
@@ -136,14 +133,14 @@ class Interpreter:
 
     def _whole_column(self, sheet: str, reference: Reference, host: Address) -> str | None:
         (top, left), (bottom, right) = (c.at(host[1:]) for c in (reference.first, reference.last))
-        first, last = (self._places.role((sheet, row, left)) for row in (top, bottom))
+        first, last = (self._addresses.role((sheet, row, left)) for row in (top, bottom))
         if left != right or not isinstance(first, tuple) or not isinstance(last, tuple):
             return None
         covers = first[0] == last[0] != "t" and (first[1], last[1]) == (0, self.model.rows - 1)
         return first[0] if covers else None
 
     def _cell(self, address: Address, step: int, fixed: bool = False) -> Slot:
-        role = self._places.role(address)
+        role = self._addresses.role(address)
         if isinstance(role, str):
             return ("scalar", role)
         if role:

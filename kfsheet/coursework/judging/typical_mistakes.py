@@ -27,7 +27,7 @@ OTHER = "a reference points to another column or parameter of the same unit"
 MOST = 400
 
 
-def mutations(model: Recurrence, key: Expr) -> Iterator[tuple[str, Expr]]:
+def typical_mistakes(model: Recurrence, key: Expr) -> Iterator[tuple[str, Expr]]:
     """Pairs of words and mutated key, likely mistakes first."""
     yield SIGN, -key
     yield TWO, 2 * key

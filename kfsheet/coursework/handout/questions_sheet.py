@@ -14,7 +14,7 @@ from typing import NamedTuple
 from openpyxl.utils import get_column_letter
 from openpyxl.workbook import Workbook
 
-from kfsheet.coursework.handout import tokens
+from kfsheet.coursework.handout import course_secret
 from kfsheet.errors import ModelError
 from kfsheet.model.exercise import Exercise, Question
 from kfsheet.workbook.write.layout import FIRST_ROW, TOKEN_NAME, Layout, quote
@@ -69,7 +69,7 @@ def salts(secret: bytes, exercise: str, student: str, name: str, rows: int) -> I
     for attempt in range(100):
         parts = (exercise, student, name, str(attempt))
         stream = b"".join(
-            tokens.digest(secret, "salt", *parts, str(n)) for n in range(rows // 32 + 2)
+            course_secret.digest(secret, "salt", *parts, str(n)) for n in range(rows // 32 + 2)
         )
         factor = 2 + int.from_bytes(stream[:4], "big") % (MODULUS - 2)
         shift = int.from_bytes(stream[4:8], "big") % MODULUS
@@ -109,7 +109,7 @@ def question_pages(
         _put_paragraph(page, row, words)
     for column, word in enumerate(HEADS, 1):
         page.put(FIRST - 1, column, word, "header", align="center")
-    hidden.put(1, 1, tokens.token(secret, exercise.name, student[0]), "index")
+    hidden.put(1, 1, course_secret.token(secret, exercise.name, student[0]), "index")
     hidden.names[TOKEN_NAME] = (1, 1)
     for n, question in enumerate(exercise.questions):
         values = _values(now, question.name)

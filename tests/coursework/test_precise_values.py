@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sympy import Rational, cos, exp, log, sin, sqrt, symbols
 
-from kfsheet.coursework.judging.arithmetic import MISSING, NoValueError, exact, value_of
+from kfsheet.coursework.judging.precise_values import MISSING, NoValueError, exact, value_of
 from kfsheet.model.expressions import Missing, Observed, t
 
 a, b = symbols("a b", real=True)

@@ -31,7 +31,7 @@ class Table:
 
 
 @dataclass
-class Places:
+class CellAddresses:
     """What stands where; a section or scalar that is gone is simply not there."""
 
     model: Recurrence
@@ -40,25 +40,25 @@ class Places:
     columns: dict[str, tuple[Table, int]] = field(default_factory=dict)
 
     @classmethod
-    def find(cls, book: Book, model: Recurrence) -> Places:
+    def find(cls, book: Book, model: Recurrence) -> CellAddresses:
         """Look through a workbook."""
-        places = cls(model)
+        addresses = cls(model)
         headers = {sheet: _headers(cells) for sheet, cells in book.sheets.items()}
         for section in model.sections:
             table = _find_table(book, headers, model, section)
             if table:
-                places.tables.setdefault(table.sheet, []).append(table)
+                addresses.tables.setdefault(table.sheet, []).append(table)
                 for number, name in table.columns.items():
-                    places.columns.setdefault(name, (table, number))
+                    addresses.columns.setdefault(name, (table, number))
         for name in (*model.parameters, *model.derived_scalars, *model.summaries):
             address = named_cell(book, name)
             if address is None or _left_of(book, address) != name:
                 address = _labelled(book, name) or address
             if address:
-                places.scalars[address] = name
-        return places
+                addresses.scalars[address] = name
+        return addresses
 
-    def address(self, name: str, step: int = 0) -> Address | None:
+    def of(self, name: str, step: int = 0) -> Address | None:
         """The cell of a column in a step, or of a scalar."""
         if name in self.columns:
             table, number = self.columns[name]
@@ -91,9 +91,9 @@ def _find_table(
     if 2 * max(counts.values(), default=0) <= len(order):
         return None
     sheet, row = max(counts, key=counts.get)
-    places = {name: _column_of(name, order, headers[sheet][row]) for name in order}
-    columns = {at: "t" if name == step else name for name, at in places.items() if at and at > 0}
-    steps = _steps(book.sheets[sheet], places[step], row, model.rows)
+    addresses = {name: _column_of(name, order, headers[sheet][row]) for name in order}
+    columns = {at: "t" if name == step else name for name, at in addresses.items() if at and at > 0}
+    steps = _steps(book.sheets[sheet], addresses[step], row, model.rows)
     return Table(sheet, columns, steps, {k: r for r, k in steps.items()}, row)
 
 
