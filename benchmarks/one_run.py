@@ -14,7 +14,8 @@ from measuring import Line, in_turn
 
 import kfsheet as kf
 from kfsheet.exercises.cannonball import cannonball
-from kfsheet.exercises.shuttlecock import joint_model, shuttlecock
+from kfsheet.exercises.shuttlecock import shuttlecock
+from kfsheet.exercises.shuttlecock.filters import joint_model
 
 
 def lines() -> Iterator[Line]:

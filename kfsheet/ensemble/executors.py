@@ -10,7 +10,7 @@ from contextlib import closing
 from itertools import islice
 from typing import Any
 
-from kfsheet.ensemble.group import BATCH, Found, Task, in_batches, run_batch, run_group
+from kfsheet.ensemble.groups import Group, GroupSums, in_batches, run_batch, run_group
 from kfsheet.ensemble.quantiles import Kept
 from kfsheet.evaluation.compiling import compiled_function, is_ready
 
@@ -18,16 +18,15 @@ WORTH_THREADS = 2**19  # rows of all members; below, threads cost more than they
 UNKNOWN_WORKERS = 64  # assumed of an executor that does not say how many it has
 
 
-def computed(task: Task, executor: Executor | None, kept: Kept) -> Found:
+def computed(group: Group, executor: Executor | None, kept: Kept) -> GroupSums:
     """What all members say; their scalars go to ``kept``.
 
     Results are added in the order of the members, a batch of groups at a time, whoever computes
     them: so the sum is the same to the last bit.
     """
-    members = task.last - task.first
-    large = members * task.rows >= WORTH_THREADS or not task.compiled
-    whole: Found | None = None
-    with closing(_batches(task, executor)) as batches, _bar(members, large) as bar:
+    large = group.members * group.rows >= WORTH_THREADS or not group.compiled
+    whole: GroupSums | None = None
+    with closing(_batches(group, executor)) as batches, _bar(group.members, large) as bar:
         for batch in batches:
             bar.update(batch.members)
             for values in batch.kept:
@@ -41,37 +40,40 @@ def computed(task: Task, executor: Executor | None, kept: Kept) -> Found:
     return whole
 
 
-def _batches(task: Task, executor: Executor | None) -> Iterator[Found]:
+def _batches(group: Group, executor: Executor | None) -> Iterator[GroupSums]:
     if executor is not None:
-        parts = task.parts(BATCH * task.size)
+        parts = group.parts(group.batch * group.size)
         yield from _in_order(executor, run_batch, parts, 4 * _workers(executor))
         return
-    groups = task.parts(task.size)
-    if task.compiled:  # once, before threads ask for it together
-        source = task.kernel.source
-        with _bar(task.last - task.first, not is_ready(source), "compiling"):
+    groups = group.parts(group.size)
+    if group.compiled:  # once, before threads ask for it together
+        source = group.kernel.source
+        with _bar(group.members, not is_ready(source), "compiling"):
             compiled_function(source)
-    small = (task.last - task.first) * task.rows < WORTH_THREADS
-    if small or not task.compiled or cores() == 1:
-        yield from in_batches(map(run_group, groups))
+    small = group.members * group.rows < WORTH_THREADS
+    if small or not group.compiled or cores() == 1:
+        yield from in_batches(map(run_group, groups), group.batch)
         return
     pool = ThreadPoolExecutor(cores())
     try:
         with closing(_in_order(pool, run_group, groups, 4 * cores())) as found:
-            yield from in_batches(found)
+            yield from in_batches(found, group.batch)
     finally:
         pool.shutdown(cancel_futures=True)
 
 
 def _in_order(
-    executor: Executor, function: Callable[[Task], Found], tasks: Iterator[Task], under_way: int
-) -> Iterator[Found]:
-    """Results in the order of the tasks, of which so many are under way at a time."""
-    running = deque(executor.submit(function, task) for task in islice(tasks, under_way))
+    executor: Executor,
+    function: Callable[[Group], GroupSums],
+    groups: Iterator[Group],
+    under_way: int,
+) -> Iterator[GroupSums]:
+    """Results in the order of the groups, of which so many are under way at a time."""
+    running = deque(executor.submit(function, group) for group in islice(groups, under_way))
     try:
         while running:
             found = running.popleft().result()
-            running.extend(executor.submit(function, task) for task in islice(tasks, 1))
+            running.extend(executor.submit(function, group) for group in islice(groups, 1))
             yield found
     finally:
         for future in running:

@@ -54,7 +54,7 @@ def pays(source: str, cells: int, before: int) -> bool:
         return False
     if is_ready(source) or cells >= WAITING:
         return True
-    if cells + before >= COMPILING:
+    if before >= COMPILING:  # after a first run, which would only be slower for the company
         _BACKGROUND.compile(source)
     return False
 
@@ -124,7 +124,7 @@ def _digest(source: str) -> str:
     from llvmlite import binding  # far quicker to import than numba
 
     machine = f"{binding.get_host_cpu_name()} {binding.get_host_cpu_features().flatten()}"
-    mathematics = (HERE / "fastmath.py").read_text(encoding="utf-8")
+    mathematics = (HERE / "compiled_functions.py").read_text(encoding="utf-8")
     parts = (source, mathematics, sys.version, version("numba"), machine)
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
 
@@ -204,7 +204,7 @@ def _dispatcher(source: str, filename: str, *, cache: bool) -> Any:
     """Numba's function of a source, not compiled yet."""
     import numba
 
-    from kfsheet.evaluation.fastmath import OPTIONS
+    from kfsheet.evaluation.compiled_functions import OPTIONS
 
     module = ModuleType(Path(filename).stem)
     sys.modules[module.__name__] = module  # the cache looks the module up by its name

@@ -20,9 +20,9 @@ import numpy as np
 
 from kfsheet.errors import DataError
 from kfsheet.evaluation.compiling import can_compile, compiled_function
-from kfsheet.evaluation.kernel import Kernel
 from kfsheet.evaluation.model_cache import ModelCache, cache_of, gaps_of
 from kfsheet.evaluation.python_source import python_source
+from kfsheet.evaluation.row_loop import Kernel
 from kfsheet.evaluation.undefined import without_value
 from kfsheet.model.run_inputs import checked_data, checked_parameters
 

@@ -12,7 +12,8 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from kfsheet.evaluation.compiling import LOADING, pays
-from kfsheet.evaluation.kernel import Kernel, kernel_of
+from kfsheet.evaluation.kernel import kernel_of
+from kfsheet.evaluation.row_loop import Kernel
 from kfsheet.model.run_inputs import check_data_name, checked_array
 from kfsheet.model.schedule import needed
 
@@ -32,8 +33,8 @@ class ModelCache:
     every: tuple[str, ...]
     frames: dict[tuple[str, ...], Any] = field(default_factory=dict)
     widths: dict[tuple[str, ...], int] = field(default_factory=dict)
-    by_python: Counter = field(default_factory=Counter)
-    """Cells computed, for each choice of columns and each kernel of a study."""
+    computed: Counter = field(default_factory=Counter)
+    """Cells that Python could have computed meanwhile, for each choice of columns (and scalars)."""
     kernels: dict[tuple[str, ...], Kernel] = field(default_factory=dict)
     """Those whose machine code is there."""
 
@@ -61,34 +62,25 @@ class ModelCache:
         if compiled is False:
             return None
         if wanted not in self.kernels:
-            before, cells = self.by_python[wanted], self._cells(model, wanted)
+            cells = self.cells(model, (*wanted, *model.derived_scalars))
+            before = self.computed[wanted]
             if not compiled and before + cells < LOADING:
-                self.by_python[wanted] += cells
+                self.computed[wanted] += cells
                 return None
             scalars = None if wanted == self.every else tuple(model.derived_scalars)
             kernel = kernel_of(model, model.version, wanted, scalars)
             if not compiled and not pays(kernel.source, cells, before):
-                self.by_python[wanted] += cells
+                self.computed[wanted] += cells
                 return None
             self.kernels[wanted] = kernel
         return self.kernels[wanted]
 
-    def _cells(self, model: Recurrence, wanted: tuple[str, ...]) -> int:
-        """How many cells a run has."""
-        if wanted not in self.widths:
-            used = needed(model, (*wanted, *model.derived_scalars))
-            self.widths[wanted] = len(used.intersection(self.every))
-        return self.rows * self.widths[wanted]
-
-    def study_is_compiled(self, kernel: Kernel, members: int, compiled: bool | None) -> bool:
-        """Whether many runs are for compiled code, all of them."""
-        if compiled is not None:
-            return compiled
-        cells = members * self.rows * len(self.every)
-        if pays(kernel.source, cells, self.by_python[kernel]):
-            return True
-        self.by_python[kernel] += cells
-        return False
+    def cells(self, model: Recurrence, names: Sequence[str]) -> int:
+        """How many cells a run has that computes what is named."""
+        names = tuple(names)
+        if names not in self.widths:
+            self.widths[names] = len(needed(model, names).intersection(self.every))
+        return self.rows * self.widths[names]
 
     def frame(
         self,

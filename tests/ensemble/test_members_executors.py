@@ -14,7 +14,7 @@ import pytest
 
 from kfsheet import Draws, study
 from kfsheet.ensemble import executors as running
-from kfsheet.ensemble.group import BATCH
+from kfsheet.ensemble.study import BATCH
 from kfsheet.evaluation.compiling import can_compile
 from kfsheet.exercises.football import football
 
@@ -144,8 +144,8 @@ def test_what_fails_in_one_group_cancels_the_others(monkeypatch):
     monkeypatch.setattr(running, "cores", lambda: 2)
     before, done = threading.active_count(), []
 
-    def failing(task):
-        done.append(task.first)
+    def failing(group):
+        done.append(group.first)
         raise RuntimeError("broken")
 
     monkeypatch.setattr(running, "run_group", failing)

@@ -30,6 +30,8 @@ from kfsheet import (
     when_observed,
 )
 from kfsheet.ensemble import executors
+from kfsheet.ensemble import study as study_module
+from kfsheet.ensemble.study import ARRAYS
 from kfsheet.errors import EngineError, WorkbookError
 from kfsheet.evaluation import compiling, model_cache
 from kfsheet.evaluation import evaluate as evaluation
@@ -148,9 +150,9 @@ def test_after_some_runs_another_process_compiles_what_is_run_often_and_nothing_
     compilers, monkeypatch
 ):
     model, cells = unlike(2), ROWS * 2
-    monkeypatch.setattr(compiling, "COMPILING", 5 * cells)
-    monkeypatch.setattr(compiling, "LOADING", 2 * cells)
-    monkeypatch.setattr(model_cache, "LOADING", 2 * cells)
+    monkeypatch.setattr(compiling, "COMPILING", 4 * cells)
+    for module in (compiling, model_cache, study_module):
+        monkeypatch.setattr(module, "LOADING", 2 * cells)
     for _ in range(4):
         evaluate(model)
     assert compilers == ([], [])
@@ -158,9 +160,9 @@ def test_after_some_runs_another_process_compiles_what_is_run_often_and_nothing_
     assert compilers == ([], [kernel_of(model, model.version, ("v", "w")).source])
     evaluate(model, columns=["v"])  # its own kernel, run once
     of_study = kernel_of(model, model.version, ("w",)).source
-    study(model, 4, columns=["w"])
+    study(model, 4 * ARRAYS, columns=["w"])
     assert of_study not in compilers[1]
-    study(model, 4, columns=["w"])
+    study(model, 4 * ARRAYS, columns=["w"])
     assert of_study in compilers[1]
     assert not compilers[0]
 
@@ -392,7 +394,7 @@ print(compiling.__file__, compiling.cache_folder())
 def test_an_installation_that_cannot_be_written_and_no_home_do_not_stop_anybody(source, tmp_path):
     """A file lies where Python and Numba want a folder, which stops even an administrator."""
     package = tmp_path / "library" / "kfsheet"
-    shutil.copytree(compiling.HERE, package, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(compiling.HERE.parent, package, ignore=shutil.ignore_patterns("__pycache__"))
     (package / "__pycache__").write_text("in the way")
     blocker = tmp_path / "home"
     blocker.write_text("in the way")
@@ -407,7 +409,7 @@ def test_an_installation_that_cannot_be_written_and_no_home_do_not_stop_anybody(
         KFSHEET_CACHE=str(blocker),
         TMPDIR=str(tmp_path / "temporary"),
     )
-    assert Path(found).parent == package
+    assert Path(found).parent == package / "evaluation"
     assert Path(folder).is_relative_to(tmp_path / "temporary")
     assert not list((tmp_path / "temporary").glob("kfsheet-*")), "removed at the end"
     assert blocker.read_text() == "in the way"
