@@ -10,9 +10,9 @@ from measuring import Line, seconds
 
 from kfsheet import load_exercise
 from kfsheet.coursework.handout.handouts import handout_bytes, solution_bytes
-from kfsheet.coursework.handout.variation import own_numbers
+from kfsheet.coursework.handout.own_numbers import own_numbers
 from kfsheet.coursework.reading.roster import Student
-from kfsheet.coursework.reports.assessing import assess
+from kfsheet.coursework.reports.assessment import assess
 from kfsheet.coursework.reports.grading import grade
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))

@@ -8,7 +8,7 @@ from measuring import peak
 from sympy import Matrix, Symbol
 
 import kfsheet as kf
-from kfsheet.workbook.write.workbook import workbook_bytes
+from kfsheet.workbook.write.write_workbook import workbook_bytes
 
 
 def walk(rows: int) -> kf.Exercise:

@@ -16,7 +16,7 @@ from kfsheet.exercises.football import football
 from kfsheet.exercises.shuttlecock import shuttlecock
 
 MEMBERS = 10_000
-STUDY = {"members": MEMBERS, "scalars": (), "compiled": can_compile()}
+STUDY = {"scalars": (), "compiled": can_compile()}
 
 
 def lines() -> Iterator[Line]:
@@ -35,7 +35,7 @@ def cannonballs() -> Line:
     wanted = [*STATE, "NIS"]
 
     def ours() -> object:
-        return kf.evaluate(cannonball, data, columns=wanted, **STUDY)
+        return kf.study(cannonball, MEMBERS, data, columns=wanted, **STUDY)
 
     study = ours()
     c = c_library()
@@ -60,12 +60,8 @@ def drawn() -> Iterator[Line]:
     four = kf.NEES(("x", "vx", "y", "vy"))
 
     def draws(**more: object) -> None:
-        kf.evaluate(
-            cannonball,
-            kf.Draws("n_theta", "n_r", seed=1),
-            members=MEMBERS,
-            columns=[*STATE, "NIS"],
-            **more,
+        kf.study(
+            cannonball, MEMBERS, kf.Draws("n_theta", "n_r", seed=1), columns=[*STATE, "NIS"], **more
         )
 
     everything = {"nees": {"NEES": four}, "quantiles": [0.05, 0.5, 0.95]}
@@ -85,8 +81,8 @@ def drawn() -> Iterator[Line]:
 EVERYTHING = f"""
 import kfsheet as kf
 from kfsheet.exercises.cannonball import cannonball
-kf.evaluate(
-    cannonball, kf.Draws("n_theta", "n_r"), members={MEMBERS}, columns=["NIS"],
+kf.study(
+    cannonball, {MEMBERS}, kf.Draws("n_theta", "n_r"), columns=["NIS"],
     nees={{"NEES": kf.NEES(("x", "vx", "y", "vy"))}}, quantiles=[0.05, 0.5, 0.95],
 )
 """
@@ -98,7 +94,7 @@ def footballs() -> Line:
     photos = photos + 3 * np.random.RandomState(2).standard_normal((MEMBERS, 16))
 
     def ours() -> object:
-        return kf.evaluate(football, {"i": photos}, columns=["x_a", "z_a"], **STUDY)
+        return kf.study(football, MEMBERS, {"i": photos}, columns=["x_a", "z_a"], **STUDY)
 
     study, theirs = ours(), vectorised_football(photos)
     for name, table in theirs.items():
@@ -117,7 +113,7 @@ def shuttlecocks() -> Line:
     draws = np.random.RandomState(3).standard_normal((MEMBERS, shuttlecock.rows))
 
     def ours() -> object:
-        return kf.evaluate(shuttlecock, {"n_x": draws}, columns=AXIS, **STUDY)
+        return kf.study(shuttlecock, MEMBERS, {"n_x": draws}, columns=AXIS, **STUDY)
 
     run = kf.evaluate(shuttlecock)
     noise = (run["x_obs"] - run["x_true"])[1] / run["n_x"][1]

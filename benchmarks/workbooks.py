@@ -15,9 +15,10 @@ from measuring import Line, in_turn, seconds
 import kfsheet as kf
 from kfsheet.exercises.cannonball import exercise as cannonball
 from kfsheet.exercises.football import exercise as football
-from kfsheet.workbook.engines.copies import strip_values
-from kfsheet.workbook.engines.recalculate import convert, libreoffice, recalculate
-from kfsheet.workbook.write.workbook import workbook_bytes
+from kfsheet.workbook.engines.copies_for_engines import strip_values
+from kfsheet.workbook.engines.libreoffice import convert, libreoffice
+from kfsheet.workbook.engines.recalculate import recalculate
+from kfsheet.workbook.write.write_workbook import workbook_bytes
 
 HERE = Path(__file__).parent
 

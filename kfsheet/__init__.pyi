@@ -1,9 +1,10 @@
 """The public names: where each is defined. kfsheet/__init__.py reads this file too."""
 
 from .cli.show import formula_table as formula_table
-from .ensemble.draws import NEES as NEES
 from .ensemble.draws import Draws as Draws
-from .ensemble.draws import Study as Study
+from .ensemble.nees import NEES as NEES
+from .ensemble.study import Study as Study
+from .ensemble.study import study as study
 from .errors import DataError as DataError
 from .errors import EngineError as EngineError
 from .errors import KfsheetError as KfsheetError
@@ -18,14 +19,14 @@ from .estimation.algebra import gain_limits as gain_limits
 from .estimation.algebra import sequential_gain as sequential_gain
 from .estimation.algebra import transition_matrix as transition_matrix
 from .estimation.algebra import transition_matrix_laplace as transition_matrix_laplace
-from .estimation.kalman import Intermediate as Intermediate
-from .estimation.kalman import Observation as Observation
-from .estimation.kalman import State as State
-from .estimation.kalman import StateSpace as StateSpace
 from .estimation.kalman import add_filter as add_filter
 from .estimation.least_squares import least_squares as least_squares
 from .estimation.least_squares import newton_step as newton_step
 from .estimation.least_squares import normal_equations as normal_equations
+from .estimation.state_space import Intermediate as Intermediate
+from .estimation.state_space import Observation as Observation
+from .estimation.state_space import State as State
+from .estimation.state_space import StateSpace as StateSpace
 from .evaluation.evaluate import evaluate as evaluate
 from .evaluation.evaluate import warm_up as warm_up
 from .evaluation.plots import draw as draw
@@ -54,8 +55,8 @@ from .model.tables import read_table as read_table
 from .printing.excel import excel_code as excel_code
 from .printing.latex import latex_code as latex_code
 from .printing.python import python_code as python_code
-from .workbook.check.check import check_workbook as check_workbook
+from .workbook.check.check_workbook import check_workbook as check_workbook
 from .workbook.engines.recalculate import recalculate as recalculate
-from .workbook.write.workbook import write_workbook as write_workbook
+from .workbook.write.write_workbook import write_workbook as write_workbook
 
 __version__: str

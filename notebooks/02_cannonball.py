@@ -231,7 +231,7 @@ ERRORS = ["e_x_obs", "e_y_obs", "e_x_a", "e_y_a"]
 
 
 def figures(model=cannonball, **parameters):
-    study = kf.evaluate(model, FLIGHTS, members=RUNS, columns=ERRORS, **parameters)
+    study = kf.study(model, RUNS, FLIGHTS, columns=ERRORS, **parameters)
     square = pd.DataFrame({e: study.rows[e]["rms"] ** 2 for e in ERRORS})
     return pd.DataFrame({"flight": square.mean(), "last 100": square[-100:].mean()}) ** 0.5
 
@@ -440,7 +440,7 @@ LEVELS = {0.5: "median", 0.75: "3 of 4 below", 0.9: "9 of 10 below", 1: "worst"}
 
 
 def spread(model):
-    study = kf.evaluate(model, FLIGHTS, members=RUNS, scalars=["rms_x_a"], quantiles=[*LEVELS])
+    study = kf.study(model, RUNS, FLIGHTS, scalars=["rms_x_a"], quantiles=[*LEVELS])
     line = study.scalars.loc["rms_x_a"]
     return [line[f"{q} quantile"] for q in LEVELS] + [line["rms"]]
 
@@ -459,7 +459,7 @@ table.T.round(0).astype(int)
 
 # %%
 sets = [
-    kf.evaluate(VARIANTS["one argument"], kf.Draws("n_theta", "n_r", seed=s), members=40).scalars
+    kf.study(VARIANTS["one argument"], 40, kf.Draws("n_theta", "n_r", seed=s)).scalars
     for s in range(100)
 ]
 found = np.quantile([s.loc["rms_x_a", "rms"] for s in sets], [0.05, 0.5, 0.95, 1])
@@ -489,7 +489,7 @@ pd.DataFrame([found.round().astype(int)], ["rms of forty flights (m)"], columns)
 # %%
 spec = {"NEES": kf.NEES(STATE)}
 wanted = ["NIS", "e_x_a", "e_x_lin"]
-study = kf.evaluate(cannonball, FLIGHTS, members=RUNS, columns=wanted, nees=spec)
+study = kf.study(cannonball, RUNS, FLIGHTS, columns=wanted, nees=spec)
 NIS, NEES = (study.rows[name]["mean"][1:] for name in ("NIS", "NEES"))
 print(f"mean NIS {NIS.mean():.3f} (2 expected), mean NEES {NEES.mean():.2f} (4 expected)")
 
@@ -539,7 +539,7 @@ pd.DataFrame(bias).loc[100::300].round(1)
 # %%
 def distrust(Phi_s):
     options = {"columns": ["NIS", "e_x_a", "e_y_a"], "nees": spec, "Phi_s": Phi_s}
-    rows = kf.evaluate(cannonball, FLIGHTS, members=RUNS, **options).rows
+    rows = kf.study(cannonball, RUNS, FLIGHTS, **options).rows
     errors = [np.sqrt((rows[e]["rms"] ** 2).mean()) for e in ("e_x_a", "e_y_a")]
     return errors + [rows[name]["mean"][1:].mean() for name in ("NIS", "NEES")]
 

@@ -66,9 +66,7 @@ ASKED |= {"scalars": SCALARS, "nees": {"NEES": kf.NEES(STATE)}, "quantiles": (0.
 
 # %%
 def fly(members, seed=1, **changes):
-    return kf.evaluate(
-        m, kf.Draws("n_theta", "n_r", seed=seed), members=members, **ASKED, **changes
-    )
+    return kf.study(m, members, kf.Draws("n_theta", "n_r", seed=seed), **ASKED, **changes)
 
 
 # %% [markdown]
@@ -772,5 +770,5 @@ table.round(2)
 #
 # 5. Estimate $\Phi_s$ by likelihood for the football's or the shuttlecock's filter. Profile the
 #    likelihood: fix $q$ on a grid, fit the rest.
-# 6. `evaluate` takes any executor: with `concurrent.futures.ProcessPoolExecutor() as pool`, give it
+# 6. `study` takes any executor: with `concurrent.futures.ProcessPoolExecutor() as pool`, give it
 #    `executor=pool`, and fly a hundred thousand times. Is the result the same to the last bit?

@@ -10,8 +10,9 @@ import pytest
 from hypothesis import settings
 
 from kfsheet.exercises.football import exercise
-from kfsheet.workbook.engines.recalculate import ENGINES, libreoffice
-from kfsheet.workbook.write.workbook import write_workbook
+from kfsheet.workbook.engines.libreoffice import libreoffice
+from kfsheet.workbook.engines.recalculate import ENGINES
+from kfsheet.workbook.write.write_workbook import write_workbook
 
 collect_ignore = ["package/users_study.py"]  # mypy reads it; nothing is to run
 matplotlib.use("Agg")

@@ -10,7 +10,7 @@ import openpyxl
 from openpyxl.utils import column_index_from_string, get_column_letter
 
 from kfsheet.coursework.handout.handouts import handout_bytes, own_run
-from kfsheet.coursework.handout.variation import own_numbers
+from kfsheet.coursework.handout.own_numbers import own_numbers
 from kfsheet.coursework.judging.judge import asked_steps
 from kfsheet.coursework.reading.roster import Student
 from kfsheet.model.expressions import Missing

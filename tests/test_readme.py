@@ -28,6 +28,6 @@ def test_the_filter_that_readme_shows_builds_and_agrees(tmp_path, monkeypatch, c
 def test_the_study_that_readme_shows_runs():
     namespace = {}
     exec(MANY.replace("10_000", "20"), namespace)
-    study = namespace["study"]
-    assert study.members == 20
-    assert study.rows["NEES"]["mean"].iloc[-1] == pytest.approx(4, abs=3)
+    flights = namespace["flights"]
+    assert flights.members == 20
+    assert flights.rows["NEES"]["mean"].iloc[-1] == pytest.approx(4, abs=3)

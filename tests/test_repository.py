@@ -12,7 +12,7 @@ from conftest import MACHINE_PATH, without_images
 from kfsheet import load_exercise
 from kfsheet.cli.commands import parser
 from kfsheet.exercises import exercise_names
-from kfsheet.workbook.write.workbook import workbook_bytes
+from kfsheet.workbook.write.write_workbook import workbook_bytes
 
 ROOT = Path(__file__).parents[1]
 REGISTRY = r"pypi\.org|files\.pythonhosted"

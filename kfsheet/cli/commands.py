@@ -15,7 +15,7 @@ from kfsheet.errors import KfsheetError, ModelError, WorkbookError
 
 if TYPE_CHECKING:
     from kfsheet.model.exercise import Exercise
-    from kfsheet.workbook.check.check import Report
+    from kfsheet.workbook.check.check_workbook import Report
 
 MOST_LINES = 20
 ENGINE_NAMES = {"ironcalc": "IronCalc", "libreoffice": "LibreOffice"}
@@ -85,7 +85,7 @@ def parser() -> Parser:
 def run_build(arguments: argparse.Namespace) -> int:
     """Write workbooks."""
     from kfsheet.exercises import exercise_names, load_exercise
-    from kfsheet.workbook.write.workbook import write_workbook
+    from kfsheet.workbook.write.write_workbook import write_workbook
 
     specs = dict.fromkeys(arguments.exercises or exercise_names())
     exercises = [load_exercise(spec) for spec in specs]
@@ -120,17 +120,17 @@ def run_check(arguments: argparse.Namespace) -> int:
 
 
 def _check_one(path: Path, arguments: argparse.Namespace) -> int:
-    from kfsheet.workbook.engines.ironcalc_process import Apart
+    from kfsheet.workbook.engines.ironcalc_process import IronCalcProcess
 
-    asked = Apart(path) if arguments.engine == "ironcalc" else None
+    asked = IronCalcProcess(path) if arguments.engine == "ironcalc" else None
     if asked:
         asked.ask()  # it works while SymPy is imported
     from kfsheet.exercises import exercise_names, load_exercise
-    from kfsheet.workbook.check.check import check
-    from kfsheet.workbook.check.opened import Opened
+    from kfsheet.workbook.check.check_workbook import check
+    from kfsheet.workbook.check.opened_workbook import OpenedWorkbook
     from kfsheet.workbook.check.trials import foreseen
 
-    book = Opened(path, arguments.engine, asked)
+    book = OpenedWorkbook(path, arguments.engine, asked)
     given = arguments.exercise
     likely = given or book.exercise_hint
     # Both take time, in which the engine works.

@@ -11,7 +11,7 @@ from kfsheet.cli.terminal import DOES_NOT_HOLD, HOLDS, complain, progress
 from kfsheet.errors import DataError
 
 if TYPE_CHECKING:
-    from kfsheet.coursework.reports.assessing import Assessment
+    from kfsheet.coursework.reports.assessment import Assessment
 
 
 def add_commands(commands: argparse._SubParsersAction, exercise: str) -> None:
@@ -56,8 +56,8 @@ def _secret_path(arguments: argparse.Namespace) -> Path:
 
 def _secret_of_handouts(arguments: argparse.Namespace) -> bytes:
     """The secret, which is made where nothing was handed out yet."""
+    from kfsheet.coursework.handout.course_secret import read_secret
     from kfsheet.coursework.handout.handouts import holds_handouts
-    from kfsheet.coursework.handout.tokens import read_secret
 
     path = _secret_path(arguments)
     if path.exists():
@@ -94,7 +94,7 @@ def run_handout(arguments: argparse.Namespace) -> int:
     print(f"{len(students)} workbooks in {Path(arguments.out) / 'students'}")
     print(f"their solutions in {Path(arguments.out) / 'solutions'}; do not hand these out")
     if arguments.notebook:
-        from kfsheet.coursework.handout.nbgrader import write_assignment
+        from kfsheet.coursework.handout.assignment_notebook import write_assignment
 
         print(write_assignment(exercise, arguments.out))
     return HOLDS
@@ -102,11 +102,11 @@ def run_handout(arguments: argparse.Namespace) -> int:
 
 def run_grade(arguments: argparse.Namespace) -> int:
     """Grade a folder of submissions; a bad file is a status in the table, not an error."""
-    from kfsheet.coursework.handout.tokens import read_secret
-    from kfsheet.coursework.reading.belonging import belongs_to, claim
-    from kfsheet.coursework.reading.collecting import passed_over
+    from kfsheet.coursework.handout.course_secret import read_secret
+    from kfsheet.coursework.reading.results_folder import belongs_to, claim
     from kfsheet.coursework.reading.roster import read_roster
-    from kfsheet.coursework.reports.assessing import NO_TOKEN
+    from kfsheet.coursework.reading.submitted_files import passed_over
+    from kfsheet.coursework.reports.assessment import NO_TOKEN
     from kfsheet.coursework.reports.grading import grade, override
     from kfsheet.coursework.reports.overrides import read_overrides, with_all_marks
     from kfsheet.coursework.reports.reports import write_reports

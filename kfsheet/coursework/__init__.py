@@ -1,6 +1,17 @@
 """Assignments for every student, and their grading.
 
 ``handout`` makes the files, ``reading`` finds the answers in what comes back, ``judging`` says what
-each is worth, ``reports`` writes the tables. Nothing here may define an exercise.
-Begin with :mod:`kfsheet.coursework.handout.handouts` and :mod:`kfsheet.coursework.reports.grading`.
+each is worth, ``reports`` writes the tables; each imports from those before it in the order
+``reading | judging | handout | reports``. Nothing here may define an exercise. Begin with
+:mod:`kfsheet.coursework.handout.handouts` and :mod:`kfsheet.coursework.reports.assessment`.
 """
+
+from importlib.util import find_spec
+
+from kfsheet.errors import EngineError
+
+# Asked for here, once: a class must not be half graded when the first plot is drawn.
+if missing := [name for name in ("gmpy2", "ironcalc", "matplotlib") if find_spec(name) is None]:
+    raise EngineError(
+        f'handouts and grading need {", ".join(missing)}: pip install "kfsheet[grading]"'
+    )

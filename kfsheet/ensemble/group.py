@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from kfsheet.ensemble.draws import Draws, normalised
+from kfsheet.ensemble.draws import Draws
+from kfsheet.ensemble.nees import normalised
 from kfsheet.ensemble.statistics import Sums
 from kfsheet.errors import DataError
 from kfsheet.evaluation.compiling import compiled_function
-from kfsheet.evaluation.evaluate import without_value
 from kfsheet.evaluation.kernel import Kernel
+from kfsheet.evaluation.undefined import without_value
 
 BATCH = 16  # groups that are added to each other before they are added to the rest
 

@@ -10,22 +10,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kfsheet.ensemble.draws import NEES, Draws, Study, check_mapping, is_whole
+from kfsheet.ensemble.draws import Draws, check_mapping, is_whole
 from kfsheet.ensemble.executors import computed
 from kfsheet.ensemble.group import Found, Task
+from kfsheet.ensemble.nees import NEES
 from kfsheet.ensemble.quantiles import Kept
 from kfsheet.ensemble.side_by_side import kernel_for_many
 from kfsheet.errors import DataError
 from kfsheet.evaluation.kernel import Kernel, kernel_of
-from kfsheet.evaluation.prepared import facts_of, gaps_of
+from kfsheet.evaluation.model_cache import cache_of, gaps_of
 from kfsheet.evaluation.python_source import python_source
 from kfsheet.model.run_inputs import check_data_name, checked_array, checked_parameters
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from kfsheet.model.quantities import Parameter
     from kfsheet.model.recurrence import Recurrence
 
@@ -33,19 +37,46 @@ NUMBERS = 2**17  # of a group: as many as fit into the cache of a core
 MOST = 2048  # members of a group
 
 
+@dataclass
+class Study:
+    """What many runs say: statistics over the members.
+
+    Attributes
+    ----------
+    members : int
+        How many runs.
+    rows : dict of str to DataFrame
+        For each column asked for, and each NEES, the statistics of every step over the members:
+        ``mean``, ``rms``, ``std`` (n - 1) and ``count``, members without a value left out.
+    scalars : DataFrame
+        For each scalar of the model ``mean``, ``rms``, ``std``, ``count`` and the quantiles asked.
+    """
+
+    members: int
+    rows: dict[str, pd.DataFrame]
+    scalars: pd.DataFrame
+
+    def __repr__(self) -> str:
+        columns = ", ".join(self.rows) or "none"
+        scalars = ", ".join(map(str, self.scalars.index)) or "none"
+        return f"<Study of {self.members} members: rows of {columns}; scalars {scalars}>"
+
+
 def study(
     model: Recurrence,
+    /,
     members: int,
-    data: Mapping[str, Any] | Draws | None,
-    columns: Sequence[str],
-    scalars: Sequence[str] | None,
-    quantiles: Sequence[float],
-    nees: Mapping[str, NEES],
-    executor: Executor | None,
-    parameters: Mapping[str, Any],
+    data: Mapping[str, Any] | Draws | None = None,
+    *,
+    columns: Sequence[str] = (),
+    scalars: Sequence[str] | None = None,
+    quantiles: Sequence[float] = (),
+    nees: Mapping[str, NEES] | None = None,
+    executor: Executor | None = None,
     compiled: bool | None = None,
+    **parameters: Any,
 ) -> Study:
-    """Run a recurrence for many members; :func:`kfsheet.evaluate` with ``members`` calls it.
+    """Run a recurrence for many members; what is kept is statistics over them.
 
     Parameters
     ----------
@@ -69,10 +100,10 @@ def study(
     executor : Executor, optional
         Who computes; threads on all cores by default. It is handed functions of kfsheet and
         arrays, so processes and other machines need kfsheet, and Numba if this one has it.
-    parameters : mapping
-        Values, or arrays of length ``members``.
     compiled : bool, optional
         As in :func:`kfsheet.evaluate`; all members are computed in the same way.
+    **parameters : float or array
+        Values for all members, or arrays of length ``members``, by name.
 
     Raises
     ------
@@ -83,15 +114,15 @@ def study(
         whose computation has no value; the message names the member.
     """
     members = _check_members(members)
-    columns, levels = _check_names("columns", columns), _check_quantiles(quantiles)
-    nees = _check_nees(model, nees)
+    columns, levels = _check_names("columns", columns or ()), _check_quantiles(quantiles)
+    nees = _check_nees(model, nees or {})
     if executor is not None and not hasattr(executor, "submit"):
         raise DataError(f"executor is {executor!r}; give one of concurrent.futures, or its like")
     given = data.data if isinstance(data, Draws) else check_mapping("data", data or {})
     scalars = _check_scalars(model, scalars)
     shared, own = _parameters(model, parameters, members)
     kernel, places = _kernel(model, columns, scalars, nees, kernel_of if own else kernel_for_many)
-    by_compiler = facts_of(model).study_is_compiled(kernel, members, compiled)
+    by_compiler = cache_of(model).study_is_compiled(kernel, members, compiled)
     task = Task(
         kernel,
         "" if by_compiler else python_source(model, [*kernel.columns, *kernel.scalars]),
@@ -160,7 +191,7 @@ def _check_nees(model: Recurrence, nees: Any) -> dict[str, NEES]:
     for name, spec in check_mapping("nees", nees).items():
         if not isinstance(spec, NEES):
             raise DataError(f"nees[{name!r}] is {spec!r}; give NEES(states)")
-        if name in facts_of(model).every:
+        if name in cache_of(model).every:
             raise DataError(f"nees[{name!r}]: {model.name} has a column of that name; take another")
     return dict(nees)
 
@@ -178,7 +209,7 @@ def _kernel(
     """The kernel, and for each NEES where it stores the errors and their covariance."""
     specs = [(spec.error_columns(model), spec.covariance_columns(model)) for spec in nees.values()]
     needed = [*columns, *(name for e, P in specs for name in [*e, *P.values()])]
-    wanted = tuple(dict.fromkeys(facts_of(model).wanted(model, needed)))
+    wanted = tuple(dict.fromkeys(cache_of(model).wanted(model, needed)))
     kernel = printed(model, model.version, wanted, scalars)
     place = {name: n for n, name in enumerate(kernel.columns)}
     return kernel, tuple(
@@ -190,13 +221,13 @@ def _kernel(
 def _drawn(model: Recurrence, draws: Draws) -> Draws:
     """The draws without the data that came with them."""
     for name in draws.columns:
-        check_data_name(name, facts_of(model).default, model)
+        check_data_name(name, cache_of(model).default, model)
     return Draws(*draws.columns, seed=draws.seed)
 
 
 def _data(model: Recurrence, given: Mapping[str, Any], members: int) -> dict[str, np.ndarray]:
     """Data columns as arrays of shape (1 or members, rows)."""
-    series = dict(facts_of(model).default)
+    series = dict(cache_of(model).default)
     for name, values in given.items():
         check_data_name(name, series, model)
         series[name] = _member_data(model, name, values, members)

@@ -150,6 +150,7 @@ def analysis(
             raise ModelError(f"{name} must be symmetric and {size} x {size}; it is {matrix}")
     if len(y) != m:
         raise ModelError(f"there are {m} observed quantities but {len(y)} observations")
+    # An affine operator is its own linearisation, H x + c; if x is left in either part, it is not.
     H = observed.jacobian(state)
     constant = simplify(observed - H * state)
     if H.has(*state) or constant.has(*state):
@@ -245,6 +246,7 @@ def transition_matrix(F: Matrix, dt: Expr) -> Matrix:
     """
     _check_square("F", F)
     term, total = eye(F.rows), zeros(F.rows, F.rows)
+    # If any power of F is 0, then F^n is (Cayley and Hamilton): n terms decide.
     for k in range(1, F.rows + 1):
         total += term
         term = (term * F * dt / k).applyfunc(_simplest)
@@ -258,6 +260,7 @@ def transition_matrix_laplace(F: Matrix, dt: Symbol) -> Matrix:
     _check_square("F", F)
     s = Symbol("s")
     resolvent = (s * eye(F.rows) - F).inv().applyfunc(simplify)
+    # Of a step that may be negative, SymPy keeps a Heaviside function in every entry.
     step = Symbol("step", positive=True)
     transform = resolvent.applyfunc(lambda e: inverse_laplace_transform(e, s, step))
     return transform.subs(step, dt).applyfunc(simplify)

@@ -72,6 +72,7 @@ def flight(k: Expr, g: Expr, tau: Expr, X: Expr) -> Matrix:
 @cache
 def _flight() -> tuple[Matrix, tuple[Symbol, ...]]:
     k, g, tau, X = symbols("k g tau X", positive=True)
+    # Gravity is made part of a homogeneous system by a third element that is 1 for ever.
     dynamics = Matrix([[0, 1, 0], [0, -k, -g], [0, 0, 0]])  # of (p, v, 1)
     solved = transition_matrix_laplace(dynamics, tau)[:2, :].subs(exp(-k * tau), 1 - k * X)
     return solved.applyfunc(lambda e: e.expand().factor()), (k, g, tau, X)

@@ -5,18 +5,16 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Generator, Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from sympy import Expr, Indexed, Matrix, S, Symbol
 
+from kfsheet.estimation.state_space import StateSpace
 from kfsheet.model.expressions import ColumnBase, Missing, column_references, t, when_observed
 from kfsheet.model.names import CHARACTER_CODE
+from kfsheet.model.recurrence import Recurrence
 from kfsheet.model.unit_text import Unit
 from kfsheet.model.validation import ENDLESS
-
-if TYPE_CHECKING:
-    from kfsheet.estimation.kalman import StateSpace
-    from kfsheet.model.recurrence import Recurrence
 
 
 def readable(name: str) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Generator, Iterator, Sequence
-from typing import TYPE_CHECKING
 
 from sympy import (
     Abs,
@@ -24,13 +23,13 @@ from sympy import (
     zeros,
 )
 
+from kfsheet.errors import ModelError
+from kfsheet.estimation.derivatives import derivative
 from kfsheet.estimation.filter_cells import Definition, FilterCells, when_words
+from kfsheet.estimation.state_space import Observation, StateSpace
 from kfsheet.model.expressions import Missing, Observed
+from kfsheet.model.recurrence import Recurrence
 from kfsheet.model.unit_text import Unit
-
-if TYPE_CHECKING:
-    from kfsheet.estimation.kalman import Observation, StateSpace
-    from kfsheet.model.recurrence import Recurrence
 
 MOST_ASKED = 2  # cells that may be missing, in the formula of NIS; more give shares columns
 MOST_TERMS = 6  # of a product of matrices within one formula; more get columns of their own
@@ -55,6 +54,7 @@ class FilterColumns(FilterCells):
     """
 
     def __init__(self, m: Recurrence, model: StateSpace, suffix: str) -> None:
+        _check_names(m, model)
         super().__init__(m, model, suffix)
         self.weighed: list[tuple[Indexed, Indexed, tuple[Indexed, ...]]] = []
         self.x = [self.cell(f"{name}_f") for name in self.names]
@@ -103,11 +103,11 @@ class FilterColumns(FilterCells):
         """Derivatives of a value with respect to the state, by the chain rule."""
         found = []
         for j, symbol in enumerate(self.model.state):
-            inner = Add(*(value.diff(w) * slope[j] for w, slope in known.items()))
+            inner = Add(*(derivative(value, w) * slope[j] for w, slope in known.items()))
             words = f"derivative of {what} with respect to {symbol}"
             slope = yield from self.derivative(
                 f"{name}_{symbol}",
-                value.diff(symbol) + inner,
+                derivative(value, symbol) + inner,
                 x_a,
                 unit / self.units[j],
                 words,
@@ -119,6 +119,7 @@ class FilterColumns(FilterCells):
         """P_f = F P_a F' + Q, the upper triangle."""
         FP = F * self.covariances("a", back=1)
         P_f = (FP * F.T).applyfunc(expand)
+        # A product of three matrices makes formulas that nobody can audit; F P gets columns.
         if max(map(_terms, P_f)) > MOST_TERMS:
             for i, j in itertools.product(self.all, repeat=2):
                 if FP[i, j] == 0:
@@ -152,6 +153,8 @@ class FilterColumns(FilterCells):
                 unit / self.units[j],
                 f"derivative of {o.name} with respect to {name}, at the forecast",
             )
+        # Those before have moved x, but h is linearised at x_f for all of them: only then
+        # is the result that of the joint update. What they explained of d is h (x - x_f).
         moved = [now - before for now, before in zip(self.x, x_f, strict=True)]
         if all(h[j] == 0 or moved[j] == 0 for j in self.all):
             return h, self.cell(f"d_{o.name}")
@@ -196,6 +199,7 @@ class FilterColumns(FilterCells):
         yield self.column(f"S_{o.name}", variance, unit**2, f"variance of {d.base}")
         K = {i: self.cell(f"K_{self.names[i]}_{o.name}") for i in touched}
         for i in touched:
+            # Without an observation the gain is 0, not missing: P then stays what it was.
             gain = self.guarded(self.gated(o, Ph[i] / S_o, d, S_o), asked, S.Zero)
             words = f"gain: {self.names[i]} for one unit of {d.base}"
             yield self.column(f"K_{self.names[i]}_{o.name}", gain, self.units[i] / unit, words)
@@ -222,6 +226,7 @@ class FilterColumns(FilterCells):
         for i, j in self.pairs():
             if i in K and j in K:
                 stage = self.stage(k, i, j)
+                # K S K' is symmetric as computed, K h P only in exact arithmetic.
                 rule = self.P[i, j] - K[i] * K[j] * S_o
                 rule = self.guarded(rule, (S_o,) if self.gaps(o.variance) else (), self.P[i, j])
                 start = self.cell(self.P_name(i, j, "f")) if stage == "a" else Missing
@@ -259,6 +264,7 @@ class FilterColumns(FilterCells):
                 yield self.column(f"NIS_{o.name}", part, Unit.read(""), f"share of {o.name}")
                 parts[n] = self.cell(f"NIS_{o.name}")
         rule = Add(*parts)
+        # A row without any observation has no NIS; 0 would lower its mean.
         if missing_some:
             rule = Piecewise((rule, Or(*seen)), (Missing, True))
         words = f"normalised innovation squared; expected: {len(parts)}"
@@ -270,6 +276,17 @@ class FilterColumns(FilterCells):
         if o.gate is None:
             return gain
         return Piecewise((gain, Abs(d) <= o.gate * sqrt(S_o)), (S.Zero, True))
+
+
+def _check_names(m: Recurrence, model: StateSpace) -> None:
+    """Refuse a state or an intermediate that is called like a scalar: its cell would replace it."""
+    scalars = {**m.parameters, **m.derived_scalars, **m.summaries}
+    for symbol in (*model.state, *model.intermediates):
+        if symbol.name in scalars:
+            raise ModelError(
+                f"{m.name} has a scalar {symbol.name} and the state space too; a formula could not "
+                "tell which is meant, so give one of them another name"
+            )
 
 
 def _terms(expression: Expr) -> int:

@@ -60,6 +60,7 @@ def normal_equations(
 def _summed(term: Expr, parameters: Sequence[Symbol], sums: Mapping[Expr, Expr]) -> Expr:
     data = sorted(term.free_symbols - set(parameters), key=str)
     total = 0
+    # A sum over the data is linear in the monomials of the data, so each may be summed alone.
     for powers, coefficient in Poly(term, *data).terms():
         monomial = Poly({powers: 1}, *data).as_expr()
         if monomial not in sums:

@@ -12,9 +12,8 @@ from __future__ import annotations
 
 import linecache
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
-from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,56 +21,43 @@ import numpy as np
 from kfsheet.errors import DataError
 from kfsheet.evaluation.compiling import can_compile, compiled_function
 from kfsheet.evaluation.kernel import Kernel
-from kfsheet.evaluation.prepared import Facts, facts_of, gaps_of
+from kfsheet.evaluation.model_cache import ModelCache, cache_of, gaps_of
 from kfsheet.evaluation.python_source import python_source
+from kfsheet.evaluation.undefined import without_value
 from kfsheet.model.run_inputs import checked_data, checked_parameters
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor
-
     import pandas as pd
 
-    from kfsheet.ensemble.draws import NEES, Draws, Study
     from kfsheet.model.recurrence import Recurrence
 
 
 def evaluate(
     model: Recurrence,
     /,
-    data: Mapping[str, Sequence[float]] | Draws | None = None,
+    data: Mapping[str, Sequence[float]] | None = None,
     *,
     columns: Sequence[str] | None = None,
-    members: int | None = None,
-    scalars: Sequence[str] | None = None,
-    quantiles: Sequence[float] = (),
-    nees: Mapping[str, NEES] | None = None,
-    executor: Executor | None = None,
     compiled: bool | None = None,
     **parameters: Any,
-) -> pd.DataFrame | Study:
-    """Run a recurrence once, or for many members.
+) -> pd.DataFrame:
+    """Run a recurrence once; :func:`kfsheet.study` runs it many times.
 
     Parameters
     ----------
     model : Recurrence
         What to run.
     data : mapping, optional
-        Other values of data columns, by name; NaN or None means "not observed". With ``members``,
-        an array of shape (members, rows) gives each member its own, and :class:`Draws` draws them.
+        Other values of data columns, by name; NaN or None means "not observed".
     columns : sequence of str, optional
         The columns that are wanted; all by default. A few are quick: nothing is computed that
         they do not need, and ``scalars`` holds the derived ones only.
-        With ``members``, those of which statistics are wanted; none by default.
-    members : int, optional
-        How many runs; the result is then a :class:`~kfsheet.ensemble.draws.Study`.
-    scalars, quantiles, nees, executor
-        With ``members``; see :func:`kfsheet.ensemble.study.study`.
     compiled : bool, optional
         True waits for the compiler, False never uses it; so each gives the same bits whenever it
         is called. By default a run is compiled when that pays: the last digits may then change
         between two runs.
     **parameters : float
-        Other values of parameters, by name; with ``members``, also arrays of that length.
+        Other values of parameters, by name.
 
     Returns
     -------
@@ -93,29 +79,31 @@ def evaluate(
     >>> evaluate(football, h=0, p=2)["z_a"].round(2).head(3).tolist()
     [0.11, 1.12, 1.83]
     """
-    if members is not None:
-        from kfsheet.ensemble.study import study
-
-        wanted = columns or (), scalars, quantiles
-        return study(model, members, data, *wanted, nees or {}, executor, parameters, compiled)
-    if scalars is not None or quantiles or nees or executor:
-        raise DataError("scalars, quantiles, nees and executor need many members; give members=")
     _check_one_run(data, columns, parameters)
     return _one_run(model, data or {}, columns, parameters, compiled)
 
 
+MANY_RUNS = ("members", "scalars", "quantiles", "nees", "executor")
+
+
 def _check_one_run(data: Any, columns: Any, parameters: Mapping[str, Any]) -> None:
-    """Refuse what only many members take, and what has the wrong form."""
+    """Refuse what only a study takes, and what has the wrong form."""
+    # No parameter of a model has one of these names: model/names.py keeps them.
+    if asked := [name for name in MANY_RUNS if name in parameters]:
+        raise DataError(
+            f"evaluate runs once and takes no {asked[0]}; "
+            "many runs are study(model, members, data, columns=...)"
+        )
     if isinstance(columns, str):
         raise DataError(f"columns is the text {columns!r}; give a list: [{columns!r}]")
     if data is not None and not hasattr(data, "items"):
         kind = type(data).__name__
-        remedy = "give members=" if kind == "Draws" else "give {name: values}"
+        remedy = "call study(model, members, data)" if kind == "Draws" else "give {name: values}"
         raise DataError(f"data is a {kind}; {remedy}")
     many = [n for n, v in parameters.items() if np.ndim(v) > 0]
     many += [n for n, v in (data or {}).items() if getattr(v, "ndim", 1) > 1]
     if many:
-        raise DataError(f"{many[0]} has values for many runs; give members=")
+        raise DataError(f"{many[0]} has values for many runs; call study(model, members, ...)")
 
 
 def _one_run(
@@ -125,24 +113,24 @@ def _one_run(
     parameters: Mapping[str, float],
     compiled: bool | None,
 ) -> pd.DataFrame:
-    facts = facts_of(model)
-    wanted = facts.wanted(model, columns)
+    cache = cache_of(model)
+    wanted = cache.wanted(model, columns)
     values = checked_parameters(model, parameters)
-    series = facts.arrays(model, data)
-    kernel = facts.kernel(model, wanted, compiled)
-    found = kernel and _run_compiled(kernel, series, values, facts)
+    series = cache.arrays(model, data)
+    kernel = cache.kernel(model, wanted, compiled)
+    found = kernel and _run_compiled(kernel, series, values, cache)
     out, scalars = found or _run_python(model, data, parameters, wanted)
     if columns is not None:
         scalars = {name: scalars[name] for name in model.derived_scalars}
-    return facts.frame(model, wanted, out, values, scalars)
+    return cache.frame(model, wanted, out, values, scalars)
 
 
 def _run_compiled(
-    kernel: Kernel, series: Mapping[str, np.ndarray], values: Mapping[str, float], facts: Facts
+    kernel: Kernel, series: Mapping[str, np.ndarray], values: Mapping[str, float], cache: ModelCache
 ) -> tuple[np.ndarray, dict[str, float]] | None:
     """Columns and scalars by the compiled kernel; None where something has no value."""
     function = compiled_function(kernel.source)
-    out = np.empty((1, len(kernel.columns), facts.rows))
+    out = np.empty((1, len(kernel.columns), cache.rows))
     results = np.empty((1, len(kernel.scalars)))
     numbers = np.array([[values[name] for name in kernel.parameters]])
     try:
@@ -158,7 +146,7 @@ def _run_python(
     parameters: Mapping[str, float],
     wanted: tuple[str, ...],
 ) -> tuple[np.ndarray, dict[str, float]]:
-    only = None if wanted == facts_of(model).every else wanted
+    only = None if wanted == cache_of(model).every else wanted
     found, scalars, _ = run(model, data, parameters, only)
     return np.array([found[name] for name in wanted], dtype=float), scalars
 
@@ -166,7 +154,7 @@ def _run_python(
 def warm_up(model: Recurrence, columns: Sequence[str] | None = None) -> None:
     """Compile a model now, rather than after some runs; does nothing without Numba.
 
-    For many runs, ``evaluate(model, members=1, compiled=True, ...)`` does the same.
+    For many runs, ``study(model, 1, compiled=True, ...)`` does the same.
 
     Parameters
     ----------
@@ -195,53 +183,6 @@ def run(
     if reason := without_value(columns, scalars, gaps_of(model, model.version)):
         raise DataError(f"{model.name}: {reason}")
     return columns, scalars, values
-
-
-def _suspicious(columns: Mapping[str, list]) -> Iterator[tuple[str, list]]:
-    """Columns that may hold something else than finite numbers: then their sum is none either."""
-    for name, column in columns.items():
-        try:
-            fine = isfinite(sum(column, 0.0))
-        except (OverflowError, TypeError):  # of endless integers, of complex numbers
-            fine = False
-        if not fine:
-            yield name, column
-
-
-def without_value(
-    columns: Mapping[str, list], scalars: Mapping[str, float], gaps: Mapping[str, np.ndarray]
-) -> str:
-    """What is infinite, complex, or NaN though nothing was missing; '' if nothing is."""
-    for name, column in _suspicious(columns):
-        if _gaps_alone(column, gaps.get(name)):
-            continue
-        for row, value in enumerate(column):
-            missing = value != value and name in gaps and gaps[name][row]
-            if not missing and (reason := _no_number(value)):
-                return f"{name} in row {row} {reason}"
-    for name, value in scalars.items():
-        if value == value and (reason := _no_number(value)):
-            return f"{name} {reason}"
-    return ""
-
-
-def _gaps_alone(column: list, gaps: np.ndarray | None) -> bool:
-    """Whether a column holds finite numbers, and NaN only where a value may be missing."""
-    try:
-        numbers = np.array(column, dtype=float)
-    except (TypeError, OverflowError):  # complex numbers, endless integers
-        return False
-    return gaps is not None and bool((np.isfinite(numbers) | (np.isnan(numbers) & gaps)).all())
-
-
-def _no_number(value: complex) -> str:
-    """Why a value is no finite number; '' if it is."""
-    try:
-        return "" if isfinite(value) else f"is {value}, no finite number"
-    except TypeError:
-        return f"is {value}, no finite number: it holds a root or power of a negative number"
-    except OverflowError:  # of an endless integer
-        return "grows beyond 1e308"
 
 
 @lru_cache(maxsize=32)

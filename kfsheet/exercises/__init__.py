@@ -1,4 +1,9 @@
-"""The exercises, and how to find one: by name, or as the path of anybody's Python file."""
+"""The exercises, and how to find one: by name, or as the path of anybody's Python file.
+
+Here belongs a folder for each exercise, with its model, words, charts, data and the methods that
+only it uses. Nothing here may have a privilege over a lecturer's own file: what an exercise needs
+of kfsheet is public. Begin with :mod:`kfsheet.exercises.football.model`, the smallest.
+"""
 
 from __future__ import annotations
 

@@ -114,6 +114,7 @@ class Exercise:
                     f"{self.name}: {name} is {given!r:.60}; give a tuple of {kind.__name__}, "
                     "with a comma even after a single one"
                 )
+        # What charts and questions name can be looked up only in a model that is complete.
         self.model.validate()
         for chart in self.charts:
             chart.check(self.model)

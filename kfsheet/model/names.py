@@ -7,12 +7,12 @@ import re
 from collections.abc import Collection
 
 CHARACTER_CODE = r"_x[0-9A-Fa-f]{1,4}_"  # Excel wants four digits, LibreOffice does with fewer
-# The generated Python source, or a keyword of evaluate(), uses these itself.
+# The generated Python source, or a keyword of evaluate() or study(), uses these itself.
 RESERVED = frozenset(
     "t rows nan sqrt exp log sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh "
     "sign floor ceil abs min max pi observed present mean rms std total count largest smallest "
     "last sumproduct isnan fsum range len zip dict columns scalars model data "
-    "members executor compiled".split()
+    "members quantiles nees executor compiled".split()
 )
 OWN_SHEETS = ("Read me", "Parameters", "Charts", "Check", "History", "Questions", "kfsheet")
 FORBIDDEN_IN_SHEETS = set("[]:*?/\\'{}!")

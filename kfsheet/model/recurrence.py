@@ -15,21 +15,18 @@ from typing import Any
 from sympy import Basic, Expr, Indexed, IndexedBase, Symbol
 
 from kfsheet.errors import DataError, ModelError
-from kfsheet.model import validation as checks
+from kfsheet.model import validation
 from kfsheet.model.expressions import (
-    Aggregate,
     ColumnBase,
-    Last,
     Missing,
     column_references,
-    lag,
     t,
 )
 from kfsheet.model.names import name_problem, section_problem
 from kfsheet.model.quantities import Column, Parameter, Scalar, checked_values
 from kfsheet.model.schedule import Pass, refuse_circle, schedule
 from kfsheet.model.unit_text import Unit
-from kfsheet.model.units import UnitProblem, UnitWalker
+from kfsheet.model.units import UnitProblem, unit_problems
 from kfsheet.printing.excel_names import excel_name_problem
 
 
@@ -65,7 +62,7 @@ class Recurrence:
         if problem := name_problem(name):
             raise ModelError(f"recurrence {name!r}: {problem}")
         for words in (title, step):
-            checks.check_words(name, words)
+            validation.check_words(name, words)
         if rows is not None and (not isinstance(rows, int) or rows < 1):
             raise ModelError(f"recurrence {name}: rows is {rows!r}; give a whole number from 1 up")
         self.name, self.title, self.step = name, title, step
@@ -112,7 +109,7 @@ class Recurrence:
         if sign not in ("", "positive", "nonnegative"):
             raise ModelError(f"parameter {name}: sign is {sign!r}, not positive or nonnegative")
         self._check_scalar_name(name)
-        checks.check_words(name, description)
+        validation.check_words(name, description)
         Unit.read(unit)
         symbol = Symbol(name, real=True, **({sign: True} if sign else {}))
         new = Parameter(symbol, value, unit, description, sign)
@@ -123,20 +120,20 @@ class Recurrence:
     def derived(self, name: str, expression: Expr, unit: str, description: str) -> Symbol:
         """Add a scalar that is a formula of parameters and earlier scalars; see ``parameter``."""
         expression = self._checked(name, expression)
-        read = checks.scalars(expression) & {s.symbol for s in self.summaries.values()}
-        if checks.columns_read(expression) or t in checks.scalars(expression) or read:
+        read = validation.scalars(expression) & {s.symbol for s in self.summaries.values()}
+        if validation.columns_read(expression) or t in validation.scalars(expression) or read:
             raise ModelError(f"derived scalar {name} reads a column; make it a summary or a column")
         return self._add_scalar(self.derived_scalars, name, expression, unit, description)
 
     def summary(self, name: str, expression: Expr, unit: str, description: str) -> Symbol:
         """Add a scalar made of aggregates of columns, as ``RMS(e_x)``; columns may read it."""
         expression = self._checked(name, expression)
-        if column_references(expression) or t in checks.scalars(expression):
+        if column_references(expression) or t in validation.scalars(expression):
             raise ModelError(
                 f"summary {name} reads single rows; take Last, Mean, RMS, ... of columns"
             )
         symbol = self._add_scalar(self.summaries, name, expression, unit, description)
-        for read in checks.columns_read(expression):
+        for read in validation.columns_read(expression):
             self._readers.setdefault(read, set()).add(name)
         return symbol
 
@@ -158,7 +155,7 @@ class Recurrence:
             If a value is no number, is infinite, or is missing where that is not allowed, or the
             column has another length than the table.
         """
-        checks.check_words(name, description)
+        validation.check_words(name, description)
         Unit.read(unit)
         numbers = checked_values(name, values, may_be_missing)
         if self._rows not in (None, len(numbers)):
@@ -211,14 +208,14 @@ class Recurrence:
             ``when_observed``, a number that should be a parameter, or a unit that does not parse.
         """
         column = self._definable(cell)
-        checks.check_words(column.name, description)
+        validation.check_words(column.name, description)
         Unit.read(unit)
         if not isinstance(start, Sequence) or isinstance(start, str):
             raise ModelError(f"{column.name}: start is {start!r}; give a list, as in start=[0]")
         rules = tuple(self._checked(column.name, rule) for rule in (*start, expression))
         for row, rule in enumerate(rules):
-            checks.check_lags(column.name, rule, row, len(start))
-            self._check_summaries(column.name, rule)
+            validation.check_lags(column.name, rule, row, len(start))
+            validation.check_summaries(column.name, rule, self.summaries, self.column)
         new = replace(
             column,
             unit=unit,
@@ -234,7 +231,7 @@ class Recurrence:
         if self.clock:
             raise ModelError("the clock is defined already")
         expression = self._checked("time", expression)
-        if checks.columns_read(expression):
+        if validation.columns_read(expression):
             raise ModelError("the clock reads a column; give it as a formula of t and parameters")
         Unit.read(unit)
         self.clock = Column(ColumnBase("time", real=True), "", unit, description, expression)
@@ -251,7 +248,7 @@ class Recurrence:
         ModelError
             If the name of the step is taken or is no word.
         """
-        checks.check_words(section, step)
+        validation.check_words(section, step)
         if problem := self._taken(step):
             raise ModelError(f"step {step!r} of section {section!r}: {problem}")
         self._steps[section] = step
@@ -354,17 +351,11 @@ class Recurrence:
         ):
             if unknown := sorted(set(given or {}) - set(names)):
                 raise ModelError(f"a {what} is given for {unknown[0]}, which {self.name} lacks")
-        known = {**self.units(), **(units or {})}
         numbers = {**self.defaults(), **(values or {})}
         for scalar in self.derived_scalars.values():
             numbers[scalar.name] = scalar.expression.subs(numbers)
-        walker = UnitWalker(known, numbers)
-        problems = []
-        for item in [*self.derived_scalars.values(), *self.all_columns(), *self.summaries.values()]:
-            reasons = (walker.problem(rule, known[item.name]) for rule in reversed(item.rules))
-            if reason := next(filter(None, reasons), None):
-                problems.append(UnitProblem(item.name, reason))
-        return problems
+        formulas = [*self.derived_scalars.values(), *self.all_columns(), *self.summaries.values()]
+        return unit_problems(formulas, {**self.units(), **(units or {})}, numbers)
 
     # -- helpers of the above --------------------------------------------------------------
 
@@ -372,7 +363,7 @@ class Recurrence:
         self, home: dict[str, Scalar], name: str, expression: Expr, unit: str, description: str
     ) -> Symbol:
         self._check_scalar_name(name)
-        checks.check_words(name, description)
+        validation.check_words(name, description)
         Unit.read(unit)
         symbol = Symbol(name, real=True)
         home[name] = Scalar(symbol, expression, unit, description)
@@ -400,8 +391,8 @@ class Recurrence:
     def _checked(self, name: str, expression: Expr) -> Expr:
         known: set[Basic] = {t, *(s.symbol for s in self._scalars().values())}
         known |= {c.base for c in self.all_columns()}
-        expression = checks.checked_expression(name, expression)
-        checks.check_symbols(name, expression, known)
+        expression = validation.checked_expression(name, expression)
+        validation.check_symbols(name, expression, known)
         return expression
 
     def _definable(self, cell: Indexed) -> Column:
@@ -414,41 +405,19 @@ class Recurrence:
             raise ModelError(f"column {column.name} is defined already")
         return column
 
-    def _check_summaries(self, name: str, rule: Expr) -> None:
-        """Refuse an aggregate inside a column, and a summary that may have no value."""
-        if rule.has(Aggregate):
-            raise ModelError(f"{name} holds an aggregate; make it a summary() and read that")
-        for symbol in checks.scalars(rule):
-            summary = self.summaries.get(symbol.name)
-            for last in summary.expression.atoms(Last) if summary else ():
-                if self.column(str(last.args[0].label)).may_be_missing:
-                    raise ModelError(f"{name} reads {symbol}, which may be missing in the last row")
-
-    def _check_observed(self, column: Column) -> None:
-        """Refuse a rule that reads a value which may be missing in the rows where it holds."""
-        for first, rule in enumerate(column.rules):
-            last = first if first < len(column.start) else checks.ENDLESS
-
-            def gap_possible(cell: Indexed, first: int = first, last: int = last) -> bool:
-                back = int(lag(cell))
-                read = self.column(str(cell.base.label))
-                return read.gap_possible(range(first - back, last - back + 1))
-
-            checks.check_observed(column.name, rule, gap_possible)
-
     def _install(self, old: Column, new: Column) -> None:
         """Put a column into the table, unless it breaks those that are there."""
         self.table[new.name] = new
-        reads = {name for rule in new.rules for name in checks.columns_read(rule)}
-        symbols = {s.name for rule in new.rules for s in checks.scalars(rule)}
+        reads = {name for rule in new.rules for name in validation.columns_read(rule)}
+        symbols = {s.name for rule in new.rules for s in validation.scalars(rule)}
         readers = self._readers.get(new.name, set())
         try:
-            self._check_observed(new)
+            validation.check_gaps(new, self.column)
             # Only a column that something reads already, or a summary's reader, closes a circle.
             if readers or new.name in reads or symbols & set(self.summaries):
                 refuse_circle(self, new)
             for name in readers & set(self.table):
-                self._check_observed(self.table[name])
+                validation.check_gaps(self.table[name], self.column)
         except ModelError:
             self.table[new.name] = old
             raise

@@ -37,6 +37,7 @@ def checked_array(model: Recurrence, name: str, values: Any) -> np.ndarray:
     array = values if isinstance(values, np.ndarray) else np.asarray(values)
     if array.ndim == 1 and array.dtype.kind in "fiu":
         array = array.astype(float)
+        # Plain numbers are looked at as a whole; where one is odd, one by one below, to name it.
         fine = np.isfinite(array) | (np.isnan(array) if optional else False)
         if fine.all() and len(array) == model.rows:
             return array

@@ -7,10 +7,10 @@ reads in the same row.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import Any, Protocol
 
 from sympy import Basic
 
@@ -19,8 +19,27 @@ from kfsheet.model.expressions import column_references, lag
 from kfsheet.model.quantities import Column, Scalar
 from kfsheet.model.validation import REMEMBERED, columns_read, scalars
 
-if TYPE_CHECKING:
-    from kfsheet.model.recurrence import Recurrence
+
+class Definitions(Protocol):
+    """What an order is found for: named definitions, of columns and of scalars."""
+
+    @property
+    def parameters(self) -> Mapping[str, Any]:
+        """Scalars that are there from the start."""
+
+    @property
+    def derived_scalars(self) -> Mapping[str, Scalar]:
+        """Formulas of parameters."""
+
+    @property
+    def summaries(self) -> Mapping[str, Scalar]:
+        """Formulas of whole columns."""
+
+    def all_columns(self) -> list[Column]:
+        """Every column, the clock first."""
+
+    def column(self, name: str) -> Column:
+        """A column by its name."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +50,7 @@ class Pass:
     summaries: tuple[Scalar, ...]
 
 
-def schedule(model: Recurrence) -> list[Pass]:
+def schedule(model: Definitions) -> list[Pass]:
     """Passes in order; raises ModelError for a circular definition, naming the circle."""
     level = _levels(model)
     formulas = [c for c in model.all_columns() if not c.is_data and c.expression is not None]
@@ -45,18 +64,19 @@ def schedule(model: Recurrence) -> list[Pass]:
     return [p for p in passes if p.rows[0] or p.summaries]
 
 
-def refuse_circle(model: Recurrence, new: Column) -> None:
+def refuse_circle(model: Definitions, new: Column) -> None:
     """Raise ModelError if a column that was just defined closes a circle.
 
     It must wait for itself, in its own row or through a summary of a whole column; the order of all
     columns, which takes long, is found only to say which circle it is.
     """
+    # A summary waits for a whole column, so it closes a circle whatever the lag.
     reads = needed(model, [new.name]) & set(model.summaries)
     if new.name in needed(model, reads) or _waits_for_itself(model, new.name):
         schedule(model)
 
 
-def _waits_for_itself(model: Recurrence, name: str) -> bool:
+def _waits_for_itself(model: Definitions, name: str) -> bool:
     """Whether a column needs itself in the same row."""
     seen: set[str] = set()
     todo = [name]
@@ -70,10 +90,12 @@ def _waits_for_itself(model: Recurrence, name: str) -> bool:
     return False
 
 
-def _levels(model: Recurrence) -> dict[str, int]:
+def _levels(model: Definitions) -> dict[str, int]:
     """Pass in which a column is computed; a summary stands one level above its columns."""
     columns, summaries = model.all_columns(), model.summaries
     level = {item.name: 0 for item in (*columns, *summaries.values())}
+    # Raise levels until nothing moves. Without a circle that takes at most one round for each name
+    # (as Bellman and Ford find longest paths); a circle raises itself for ever.
     for _ in range(len(level) + 1):
         before = dict(level)
         for column in columns:
@@ -114,6 +136,7 @@ def _circle(reads: dict[str, set[str]]) -> list[str]:
     """Follow what each column waits for until a name comes back; every one waits for another."""
     path = [next(iter(reads))]
     while True:
+        # Any that it waits for will do; the smallest name makes the message the same every time.
         following = min(reads[path[-1]])
         if following in path:
             return [*path[path.index(following) :], following]
@@ -126,7 +149,7 @@ def same_row(expression: Basic) -> frozenset[str]:
     return frozenset(str(c.base.label) for c in column_references(expression) if lag(c) == 0)
 
 
-def needed(model: Recurrence, names: Iterable[str]) -> set[str]:
+def needed(model: Definitions, names: Iterable[str]) -> set[str]:
     """Everything that must be computed for some columns and scalars, themselves included."""
     formulas = {**model.derived_scalars, **model.summaries}
     found: set[str] = set()

@@ -43,6 +43,7 @@ def read_table(
     """
     path = Path(path)
     try:
+        # Excel begins a CSV file with a byte-order mark, else a part of the first name.
         with path.open(newline="", encoding="utf-8-sig") as file:
             header, *rows = [row for row in csv.reader(file) if row] or [[]]
     except (OSError, UnicodeDecodeError, csv.Error) as error:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
@@ -34,6 +34,7 @@ from sympy.logic.boolalg import Boolean
 
 from kfsheet.errors import ModelError
 from kfsheet.model.expressions import Aggregate, Count, Missing, Observed, SumProduct
+from kfsheet.model.quantities import Column, Scalar
 from kfsheet.printing.formula_printer import human_terms
 from kfsheet.printing.python import python_code
 
@@ -119,6 +120,7 @@ class UnitWalker:
 
     def of(self, e: Basic) -> Quantity | None:
         """Unit of a node; None for 0 and Missing, which have every unit."""
+        # 0 m and 0 px are the same nothing, so that v = 0 may start any column.
         if e == 0 or e is Missing:
             return None
         if isinstance(e, Number | NumberSymbol):
@@ -176,6 +178,7 @@ class UnitWalker:
         base = self.of(e.base)
         if base is None or (base.unitless and self.same(base, self.none)):
             return base
+        # A parameter may be an exponent, as p of dt**p; its value decides the unit.
         known = {s: self.values[s.name] for s in e.exp.free_symbols if str(s) in self.values}
         exponent = e.exp.subs(known)
         if not exponent.is_number:
@@ -216,6 +219,20 @@ class UnitWalker:
         if one.dimensionality != two.dimensionality:
             return False
         return abs((one / two).to_base_units().magnitude - 1) < 1e-9
+
+
+def unit_problems(
+    formulas: Iterable[Column | Scalar], units: Mapping[str, str], values: Mapping[str, float]
+) -> list[UnitProblem]:
+    """Every formula whose terms do not agree, or that is not in the unit of its name."""
+    walker = UnitWalker(units, values)
+    found = []
+    for item in formulas:
+        # The general expression first: it says more than a start value.
+        reasons = (walker.problem(rule, units[item.name]) for rule in reversed(item.rules))
+        if reason := next(filter(None, reasons), None):
+            found.append(UnitProblem(item.name, reason))
+    return found
 
 
 def _names(quantity: Quantity) -> set[str]:

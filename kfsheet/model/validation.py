@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Set
+from collections.abc import Callable, Iterator, Mapping, Set
 from functools import lru_cache
+from math import factorial
 from typing import Any
 
 from sympy import (
@@ -21,10 +22,17 @@ from sympy import (
 from sympy.logic.boolalg import And, Not, Or
 
 from kfsheet.errors import ModelError, PrintError
-from kfsheet.model.expressions import Aggregate, Observed, column_references, lag
+from kfsheet.model.expressions import Aggregate, Last, Observed, column_references, lag
+from kfsheet.model.quantities import Column, Scalar
 from kfsheet.printing.python import python_code
 
 LARGEST_NUMBER, LARGEST_DENOMINATOR = 12, 16
+# Denominators of Taylor's series, k!, and of the noise that integrators of white noise gather,
+# i! j! (i + j + 1): dt^5/20 for a constant acceleration, dt^7/252 one order further.
+OF_SERIES = {
+    *(factorial(k) for k in range(8)),
+    *(factorial(i) * factorial(j) * (i + j + 1) for i in range(5) for j in range(5)),
+}
 FULL_CIRCLE = {60, 90, 180, 360}
 REMEMBERED = 4096  # expressions whose parts are asked for again and again by schedule()
 ENDLESS = 1_048_576  # more rows than a worksheet has
@@ -38,6 +46,7 @@ def checked_expression(name: str, expression: Any) -> Expr:
         raise ModelError(f"{name} is defined as {expression!r}; give a SymPy expression") from None
     if not isinstance(expression, Expr):
         raise ModelError(f"{name} is defined as {expression}, which is no number in a row")
+    # 0.5 is what people write for a half; SymPy would carry it as a float and print 0.5*x.
     expression = expression.xreplace({f: _exact(f) for f in expression.atoms(Float)})
     for number in (node for node in walk(expression) if isinstance(node, Float | Rational)):
         if isinstance(number, Float) or not _small(number):
@@ -46,6 +55,7 @@ def checked_expression(name: str, expression: Any) -> Expr:
                 "so that it has a name, a unit and a place where it can be changed"
             )
     _check_columns(name, expression)
+    # What cannot be printed now would fail later, far from the line that wrote it.
     try:
         python_code(expression)
     except PrintError as error:
@@ -67,7 +77,8 @@ def _check_columns(name: str, expression: Expr) -> None:
 
 
 def _small(number: Rational) -> bool:
-    small = abs(number.p) <= LARGEST_NUMBER and number.q <= LARGEST_DENOMINATOR
+    denominators = number.q <= LARGEST_DENOMINATOR or number.q in OF_SERIES
+    small = abs(number.p) <= LARGEST_NUMBER and denominators
     return small or {abs(number.p), number.q} <= FULL_CIRCLE | {1}
 
 
@@ -139,6 +150,32 @@ def check_observed(name: str, expression: Expr, gap_possible: Callable[[Indexed]
             f"{name} reads {culprit}, which may be missing; "
             f"write when_observed({culprit}, ...) around the part that needs it"
         )
+
+
+def check_gaps(column: Column, find: Callable[[str], Column]) -> None:
+    """Refuse a column with a rule that reads a value which may be missing where the rule holds."""
+    for first, rule in enumerate(column.rules):
+        # A start value holds in its own row, the general expression in all that follow.
+        last = first if first < len(column.start) else ENDLESS
+
+        def gap_possible(cell: Indexed, first: int = first, last: int = last) -> bool:
+            back = int(lag(cell))
+            return find(str(cell.base.label)).gap_possible(range(first - back, last - back + 1))
+
+        check_observed(column.name, rule, gap_possible)
+
+
+def check_summaries(
+    name: str, rule: Expr, summaries: Mapping[str, Scalar], find: Callable[[str], Column]
+) -> None:
+    """Refuse an aggregate inside a column, and a summary that may have no value."""
+    if rule.has(Aggregate):
+        raise ModelError(f"{name} holds an aggregate; make it a summary() and read that")
+    for symbol in scalars(rule):
+        summary = summaries.get(symbol.name)
+        for last in summary.expression.atoms(Last) if summary else ():
+            if find(str(last.args[0].label)).may_be_missing:
+                raise ModelError(f"{name} reads {symbol}, which may be missing in the last row")
 
 
 def _unguarded(e: Basic, known: frozenset, gap_possible: Callable[[Indexed], bool]) -> Basic | None:

@@ -1,99 +1,25 @@
 """Text of an Excel formula -> SymPy expression: the way back from :mod:`kfsheet.printing.excel`.
 
-formualizer parses the text with Excel's own precedence: unary minus binds *tighter* than ``^``,
-``2^3^2`` is read from the left, ``%`` comes after its number. What is not arithmetic of numbers
-(arrays, look-ups, text, names that are made from text) is refused, never guessed.
+:mod:`kfsheet.parsing.syntax` reads the text by Excel's own precedence; here each node of its tree
+becomes mathematics. What is not arithmetic of numbers (arrays, look-ups, text, names that are made
+from text) is refused, never guessed.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
-from typing import Any
 
-import formualizer
 from sympy import ITE, Basic, Expr, Float, Integer, Piecewise, Rational, S, Symbol
 
 from kfsheet.errors import FormulaError
 from kfsheet.model.expressions import Missing
 from kfsheet.parsing.functions import FUNCTIONS, as_condition, as_number, compare, is_truth, power
 from kfsheet.parsing.references import Reference, read_reference
+from kfsheet.parsing.syntax import Tree, parse_formula
 
-LONGEST = 2_000  # characters; kfsheet's own stay below 255, Excel's limit is 8,192
-DEEPEST = 60  # levels of a formula's tree
-
-Tree = tuple
-"""``(kind, ...)``: number, text, truth, reference, operator or call, hashable."""
 Meaning = Basic | list[list[Basic]]
 """What a reference stands for: an expression, a whole column, or the cells of a range by row."""
 LookUp = Callable[[Reference], Meaning]
-
-
-def parse_formula(text: str) -> Tree:
-    """The syntax tree of a formula, ``=`` included or not, as nested tuples.
-
-    Raises
-    ------
-    FormulaError
-        If the text is no formula, or is too long or too deep to be one that a person wrote.
-    """
-    if len(text) > LONGEST:
-        raise FormulaError(f"the formula has {len(text)} characters; {LONGEST} are read")
-    _check_depth(text)
-    try:
-        node = formualizer.parse(text if text.startswith("=") else f"={text}")
-    except (KeyboardInterrupt, SystemExit):
-        raise
-    except BaseException as error:  # its own kinds and, from Rust, a panic, which is no Exception
-        place = re.search(r"position (\d+)", str(error))
-        where = f" near its character {int(place[1]) + 1}" if place else ""
-        raise FormulaError(f"the formula cannot be read{where}") from None
-    return _tree(node.to_dict(), 0)
-
-
-def _check_depth(text: str) -> None:
-    """Refuse before parsing what would nest deeper than a parser's stack."""
-    depth = signs = 0
-    for character in text:
-        depth += (character == "(") - (character == ")")
-        signs = signs + 1 if character in "+-@%" else 0 if character.strip() else signs
-        if depth > DEEPEST or signs > DEEPEST:
-            raise FormulaError(f"the formula is nested deeper than {DEEPEST} levels")
-
-
-def _tree(node: dict[str, Any], depth: int) -> Tree:
-    kind = node["node_type"]
-    if depth > LONGEST:
-        raise FormulaError("the formula is nested too deep")
-    if kind == "Literal":
-        return _literal(node["value"])
-    if kind == "Reference":
-        return ("reference", read_reference(node["reference"]))
-    if kind == "UnaryOp":
-        return ("unary", node["operator"], _tree(node["operand"], depth + 1))
-    if kind == "BinaryOp":
-        sides = (_tree(node[side], depth + 1) for side in ("left", "right"))
-        return ("binary", node["operator"], *sides)
-    if kind == "Function":
-        return ("call", _plain(node["name"]), *(_tree(a, depth + 1) for a in node["args"]))
-    if kind == "Omitted":
-        return ("number", 0.0)
-    raise FormulaError(f"a formula holds {kind.lower()}s, which are not read")
-
-
-def _plain(name: str) -> str:
-    return name.upper().removeprefix("_XLFN.")
-
-
-def _literal(value: Any) -> Tree:
-    if isinstance(value, bool):
-        return ("truth", value)
-    if isinstance(value, int | float):
-        return ("number", float(value))
-    text = str(value)
-    if text.startswith("#"):
-        raise FormulaError(f"the formula holds the error {text}")
-    return ("text", text)
 
 
 def references(tree: Tree) -> list[Reference]:
@@ -169,6 +95,18 @@ class _Reader:
 
     def _text(self, value: str) -> Basic:
         return Missing
+
+    def _omitted(self) -> Expr:
+        return S.Zero
+
+    def _error(self, value: str) -> Basic:
+        raise FormulaError(f"the formula holds the error {value}")
+
+    def _array(self, *rows: Tree) -> Basic:
+        raise FormulaError("a formula holds arrays, which are not read")
+
+    def _foreign(self, text: str) -> Basic:
+        raise FormulaError(f"{text} is no cell, range or name of this workbook")
 
     def _reference(self, reference: Reference) -> Meaning:
         return self._look_up(reference)

@@ -76,6 +76,7 @@ class ExcelPrinter(FormulaPrinter):
 
     def _print_Float(self, expr: Expr) -> str:
         text = repr(float(expr)).replace("e", "E")
+        # Zeros at either end are not counted by Excel either.
         digits = text.split("E")[0].lstrip("-").replace(".", "").strip("0")
         if len(digits) > EXCEL_DIGITS:
             raise PrintError(
@@ -101,10 +102,12 @@ class ExcelPrinter(FormulaPrinter):
     _print_Max = _print_Mod = _print_Observed = _print_Min
 
     def _print_atan2(self, expr: Expr) -> str:
+        # Excel's order of the arguments is the other way round.
         y, x = expr.args
         return self._call("ATAN2", x, y)
 
     def _print_ceiling(self, expr: Expr) -> str:
+        # Excel's CEILING takes a second argument, and programs differ for negative numbers.
         return f"(-INT({self._print(-expr.args[0])}))"
 
     def _print_Piecewise(self, expr: Basic) -> str:

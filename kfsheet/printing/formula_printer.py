@@ -101,6 +101,8 @@ class FormulaPrinter(CodePrinter):
         return self._print(sympify(expr))
 
     def _print(self, expr: Basic, **kwargs: object) -> str:
+        # Only methods of ours: CodePrinter would print a matrix or an unknown function as text that
+        # looks like a formula.
         for node in type(expr).__mro__:
             name = "_print_" + node.__name__
             if any(name in vars(cls) for cls in _ours(type(self))):
@@ -144,6 +146,7 @@ class FormulaPrinter(CodePrinter):
 
     def _print_Mul(self, expr: Mul) -> str:
         above, below, negative = [], [], False
+        # A person writes a*b/(c*d) with one minus in front, where SymPy keeps -1 and powers of -1.
         for factor in human_factors(_factors(expr)):
             divides = _is_division(factor)
             size, minus = _unsigned(_divisor(factor) if divides else factor)

@@ -11,7 +11,7 @@ import nbformat
 import pytest
 
 from kfsheet import load_exercise
-from kfsheet.coursework.handout.nbgrader import assignment, write_assignment
+from kfsheet.coursework.handout.assignment_notebook import assignment, write_assignment
 from kfsheet.exercises import exercise_names
 
 NBGRADER = str(Path(sys.executable).parent / "nbgrader")

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import students as do
 
-from kfsheet import Draws, evaluate
-from kfsheet.coursework.judging.workers import run_on
+from kfsheet import Draws, study
+from kfsheet.coursework.judging.worker_pool import run_on
 from kfsheet.coursework.reading.roster import Student
 from kfsheet.coursework.reports.grading import grade
 from kfsheet.errors import EngineError
@@ -38,9 +38,9 @@ def pixels():
 def test_a_cluster_computes_the_same_to_the_last_bit(cluster, monkeypatch, options, compiled):
     monkeypatch.setattr("kfsheet.ensemble.study.MOST", 8)  # seven groups for two processes
     asked = {"columns": ["e_x_a"], "scalars": ("rms_x_a", "K_x"), "compiled": compiled}
-    here = evaluate(football, members=MANY, **asked, **options)
+    here = study(football, MANY, **asked, **options)
     with cluster.get_executor() as executor:
-        there = evaluate(football, members=MANY, executor=executor, **asked, **options)
+        there = study(football, MANY, executor=executor, **asked, **options)
     assert there.rows["e_x_a"].equals(here.rows["e_x_a"])
     assert there.scalars.equals(here.scalars)
     assert here.scalars.loc["rms_x_a", "std"] > 0
@@ -52,7 +52,7 @@ def test_the_processes_are_others(cluster):
 
 def test_a_cluster_gives_the_marks_that_were_earned(cluster, monkeypatch, tmp_path):
     """Its workers judge in processes of their own, with limits, as grading does here."""
-    monkeypatch.setattr("kfsheet.coursework.judging.workers.BATCH", 1)  # each has something to do
+    monkeypatch.setattr("kfsheet.coursework.judging.worker_pool.BATCH", 1)  # work for both
     bob = Student("s002", "Bob")
     returned = tmp_path / "returned"
     returned.mkdir()

@@ -16,19 +16,19 @@ from students import ADA, SECRET, Paper
 
 from kfsheet import DataError, ModelError, load_exercise
 from kfsheet.cli import commands as cli
+from kfsheet.coursework.handout.course_secret import read_secret, read_token, token
 from kfsheet.coursework.handout.handouts import handout_bytes, own_run
-from kfsheet.coursework.handout.questions import FIRST, LOOKS_RIGHT, NOT_YET
-from kfsheet.coursework.handout.tokens import read_secret, read_token, token
-from kfsheet.coursework.handout.variation import own_numbers
+from kfsheet.coursework.handout.own_numbers import own_numbers
+from kfsheet.coursework.handout.questions_sheet import FIRST, LOOKS_RIGHT, NOT_YET
 from kfsheet.coursework.judging.judge import CREDIT, Mark
-from kfsheet.coursework.reading.collecting import owner
 from kfsheet.coursework.reading.roster import Student, harmless, read_roster
-from kfsheet.coursework.reports.assessing import Assessment
+from kfsheet.coursework.reading.submitted_files import owner
+from kfsheet.coursework.reports.assessment import Assessment
 from kfsheet.coursework.reports.grading import STATUSES, Handed, _fingerprint, _result, grade
-from kfsheet.coursework.reports.marking import _with_words
+from kfsheet.coursework.reports.marked_workbook import _with_words
 from kfsheet.exercises import exercise_names
 from kfsheet.model.exercise import Exercise
-from kfsheet.workbook.check.check import check_workbook
+from kfsheet.workbook.check.check_workbook import check_workbook
 from kfsheet.workbook.engines.recalculate import recalculate
 
 FOOTBALL = load_exercise("football")

@@ -12,10 +12,10 @@ import kfsheet.exercises
 from kfsheet import load_exercise
 from kfsheet.coursework.handout.handouts import handout_bytes
 from kfsheet.coursework.reading.roster import Student
-from kfsheet.coursework.reports.assessing import assess
+from kfsheet.coursework.reports.assessment import assess
 from kfsheet.coursework.reports.grading import _judged
 from kfsheet.exercises import exercise_names
-from kfsheet.workbook.engines.recalculate import convert, libreoffice
+from kfsheet.workbook.engines.libreoffice import convert, libreoffice
 
 FULL = {"status": "right", "remark": ""}
 
@@ -505,7 +505,7 @@ def test_rows_that_are_right_are_named_beside_empty_ones(football):
 
 def test_a_formula_that_takes_for_ever_costs_its_own_answer_only(football, monkeypatch):
     """Whole columns inside SUMPRODUCT: a million rows in every cell."""
-    monkeypatch.setattr("kfsheet.coursework.judging.recalculating.SECONDS", 6)
+    monkeypatch.setattr("kfsheet.coursework.judging.recalculated_answers.SECONDS", 6)
     football.answer_all()
     for cell, _ in football.cells("u")[1:]:
         cell.value = f"=SUMPRODUCT((A:A=A{cell.row}-1)*(K:K))+IFERROR(0,1)"
@@ -520,7 +520,7 @@ def test_an_answer_for_which_there_was_no_time_is_not_kept(football, monkeypatch
     path = football.save()
 
     def graded(seconds):
-        monkeypatch.setattr("kfsheet.coursework.judging.recalculating.SECONDS", seconds)
+        monkeypatch.setattr("kfsheet.coursework.judging.recalculated_answers.SECONDS", seconds)
         judging = (((None, None, path, None), assess("football", SECRET, path)) for _ in (1,))
         keys = {path: "key"}
         run = (keys, "football", SECRET, tmp_path, lambda tasks: judging if tasks else ())

@@ -14,11 +14,11 @@ from students import ADA, SECRET, Paper
 
 from kfsheet import load_exercise
 from kfsheet.coursework.handout.handouts import handout_bytes
-from kfsheet.coursework.judging.workers import Failed, Pool
+from kfsheet.coursework.judging.worker_pool import Failed, Pool
 from kfsheet.coursework.reading import submission
 from kfsheet.coursework.reading.submission import read_submission
 from kfsheet.coursework.reading.worksheet import Formula
-from kfsheet.coursework.reports.assessing import assess
+from kfsheet.coursework.reports.assessment import assess
 from kfsheet.coursework.reports.grading import STATUSES
 
 FUZZED = 2_000

@@ -11,6 +11,7 @@ from kfsheet import (
     Recurrence,
     Sum,
     evaluate,
+    study,
     t,
     when_observed,
 )
@@ -138,7 +139,7 @@ def test_the_member_that_diverges_is_named_whichever_its_lane(number):
     seen = np.zeros((2 * WIDTH + 3, ROWS))
     seen[number, 1] = 1e200
     with pytest.raises(DataError, match=f"member {number} has no value: it grows beyond 1e308"):
-        evaluate(filtered(), {"y": seen}, members=len(seen), columns=["x"], compiled=True)
+        study(filtered(), len(seen), {"y": seen}, columns=["x"], compiled=True)
 
 
 def test_a_division_by_a_parameter_that_is_zero_is_refused_and_explained():
@@ -147,9 +148,9 @@ def test_a_division_by_a_parameter_that_is_zero_is_refused_and_explained():
     (x,) = m.columns("x", section="S")
     m.define(x[t], x[t - 1] / a, "", "x", start=[1])
     assert is_vector(m)
-    assert evaluate(m, members=9, columns=["x"], compiled=True).rows["x"]["mean"][ROWS - 1] == 1
+    assert study(m, 9, columns=["x"], compiled=True).rows["x"]["mean"][ROWS - 1] == 1
     with pytest.raises(DataError, match="member 0 has no value: division by zero"):
-        evaluate(m, members=9, columns=["x"], compiled=True, a=0)
+        study(m, 9, columns=["x"], compiled=True, a=0)
 
 
 @pytest.mark.parametrize("compiled", [False, True])

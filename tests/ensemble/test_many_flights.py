@@ -9,9 +9,9 @@ import pytest
 from scipy.optimize import minimize
 from scipy.stats import multivariate_normal, norm
 
-from kfsheet import NEES, Draws, evaluate
+from kfsheet import NEES, Draws, evaluate, study
 from kfsheet.exercises.cannonball import cannonball
-from tests.exercises.test_cannonball import DT, NAMES, P_0, F, G, N, radar_slope
+from tests.exercises.cannonball.test_cannonball import DT, NAMES, P_0, F, G, N, radar_slope
 
 B = np.array([304.8, -30.48, -304.8, 30.48])
 R = np.diag([0.01**2, 30.48**2])
@@ -25,11 +25,11 @@ def fly(members, draws=DRAWS, **parameters):
     """Per sweep: real/claimed error of each element, NIS and NEES."""
     nees = {"NEES": NEES(tuple(NAMES))}
     options = {"columns": COLUMNS, "scalars": ["rms_x_a", "rms_y_a"], "nees": nees}
-    study = evaluate(cannonball, draws, members=members, **options, **parameters)
-    rows = study.rows
+    ensemble = study(cannonball, members, draws, **options, **parameters)
+    rows = ensemble.rows
     found = {n: rows[f"e_{n}_a"]["rms"] / rows[f"P_{n}{n}_a"]["mean"] ** 0.5 for n in NAMES}
     found |= {name: rows[name]["mean"] for name in ("NIS", "NEES")}
-    return pd.DataFrame(found), study
+    return pd.DataFrame(found), ensemble
 
 
 def starts(factor, error=B):
@@ -71,13 +71,13 @@ def passed_on():
 
 def test_what_a_common_start_does_is_linear_algebra(common):
     """Errors are (A b, P_a - A P_0 A'): their size, the NEES and the coverage follow."""
-    found, study = common
+    found, ensemble = common
     P, A = passed_on()
     C = P + A @ (np.outer(B, B) - P_0) @ A.swapaxes(1, 2)
     for k, name in enumerate(NAMES):
         expected = np.sqrt(C[:, k, k] / P[:, k, k])
         assert np.abs(found[name][1:] - expected).max() < 4 * math.sqrt(0.5 / FLIGHTS), name
-        mean, error = study.rows[f"e_{name}_a"]["mean"][1:], np.sqrt(P[:, k, k] / FLIGHTS)
+        mean, error = ensemble.rows[f"e_{name}_a"]["mean"][1:], np.sqrt(P[:, k, k] / FLIGHTS)
         assert (np.abs(mean - (A @ B)[:, k]) / error)[5:].max() < 4.5, name
     expected = np.trace(np.linalg.solve(P, C), axis1=1, axis2=2)
     assert np.abs(found["NEES"][1:] - expected).max() < 4 * math.sqrt(8 / FLIGHTS)
@@ -153,8 +153,8 @@ def test_what_the_filter_is_told_of_the_start_matters_to_its_honesty_not_to_its_
     members = 200
 
     def figures(**changed):
-        found, study = fly(members, **changed)
-        errors = study.scalars["mean"]
+        found, ensemble = fly(members, **changed)
+        errors = ensemble.scalars["mean"]
         return np.array([errors["rms_x_a"], errors["rms_y_a"], found["NEES"][EARLY].mean()])
 
     basis = figures()

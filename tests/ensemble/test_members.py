@@ -8,6 +8,7 @@ from kfsheet import (
     DataError,
     Recurrence,
     evaluate,
+    study,
     t,
 )
 from kfsheet.ensemble.statistics import Sums
@@ -48,7 +49,7 @@ def small_groups(monkeypatch):
 
 def flights(count=MANY, **options):
     options = {"columns": ["e_x_a", "d_i"], "compiled": can_compile(), **options}
-    return evaluate(football, members=count, **options)
+    return study(football, count, **options)
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +91,7 @@ def test_members_are_the_single_runs_bit_for_bit(monkeypatch, model, columns, ow
     }
     names = [] if columns else [*model.derived_scalars, *model.summaries]
     columns = columns or [c.name for c in model.all_columns()]
-    evaluate(model, given, members=MANY, columns=columns, scalars=names, compiled=True, **own)
+    study(model, MANY, given, columns=columns, scalars=names, compiled=True, **own)
     rows, results = np.concatenate(seen[::2]), np.concatenate(seen[1::2])
     for k in range(MANY):
         data = {name: values[k] for name, values in given.items()}
@@ -101,11 +102,11 @@ def test_members_are_the_single_runs_bit_for_bit(monkeypatch, model, columns, ow
 
 def test_statistics_are_those_of_the_single_runs(photos):
     r_i = np.linspace(1, 100, MANY)
-    study = flights(data=photos, r_i=r_i, h=0, p=2)
+    ensemble = flights(data=photos, r_i=r_i, h=0, p=2)
     singles = [evaluate(football, {"i": photos["i"][k]}, r_i=r_i[k], h=0, p=2) for k in range(MANY)]
     for name in ("e_x_a", "d_i"):
         stack = np.array([run[name] for run in singles])
-        found = study.rows[name]
+        found = ensemble.rows[name]
         assert (found["count"] == (~np.isnan(stack)).sum(axis=0)).all()
         some = found["count"] > 0
         for statistic, expected in (
@@ -119,27 +120,24 @@ def test_statistics_are_those_of_the_single_runs(photos):
 
 
 def test_quantiles_of_scalars_are_those_of_the_members(photos):
-    study = flights(data=photos, quantiles=(0.05, 0.5))
+    ensemble = flights(data=photos, quantiles=(0.05, 0.5))
     values = [
         evaluate(football, {"i": photos["i"][k]}).attrs["scalars"]["rms_x_a"] for k in range(MANY)
     ]
-    assert len(repr(study).splitlines()) == 1
-    found = study.scalars.loc["rms_x_a", ["0.05 quantile", "0.5 quantile"]]
+    assert len(repr(ensemble).splitlines()) == 1
+    found = ensemble.scalars.loc["rms_x_a", ["0.05 quantile", "0.5 quantile"]]
     np.testing.assert_allclose(found, np.quantile(values, [0.05, 0.5]), rtol=1e-12)
 
 
 def test_a_small_spread_about_a_large_mean_keeps_its_figures(monkeypatch):
     """Millimetres about a thousand kilometres, in groups that have other means."""
-    from kfsheet.ensemble import study as members
-
-    monkeypatch.setattr(members, "MOST", 16)
     m = Recurrence("far", title="Far away")
     x = m.data("x", [0.0, 0.0], "m", "given", section="S")
     (y,) = m.columns("y", section="S")
     m.define(y[t], x[t] + 0, "m", "seen")
     values = 1e6 + 1e-3 * np.random.RandomState(3).standard_normal((50, 2))
     values[:, 1] = 1e6
-    found = evaluate(m, {"x": values}, members=50, columns=["y"], scalars=()).rows["y"]
+    found = study(m, 50, {"x": values}, columns=["y"], scalars=()).rows["y"]
     assert found["std"][0] == pytest.approx(np.std(values[:, 0] - 1e6, ddof=1), rel=1e-6)
     assert found["std"][1] == 0
     np.testing.assert_allclose(found["rms"], np.sqrt(np.mean(values**2, axis=0)), rtol=1e-15)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kfsheet import DataError, Draws, Last, Recurrence, evaluate, t, when_observed
+from kfsheet import DataError, Draws, Last, Recurrence, study, t, when_observed
 from kfsheet.ensemble.quantiles import Kept, order_statistics
 
 ROWS, MEMBERS = 3, 40
@@ -43,17 +43,19 @@ def test_every_member_of_every_group_has_the_draws_of_its_number(seed):
     for first, last in ((0, 40), (16, 32), (39, 40)):
         block = found.block(first, last, ROWS)
         assert (block == expected[first:last].transpose(1, 0, 2)).all()
-    study = evaluate(echo(), found, members=MEMBERS, columns=["x", "y"])
+    ensemble = study(echo(), MEMBERS, found, columns=["x", "y"])
     for name, column in (("x", 0), ("y", 1)):
         values = expected[:, column]
-        np.testing.assert_allclose(study.rows[name]["mean"], values.mean(axis=0), rtol=1e-12)
-        np.testing.assert_allclose(study.rows[name]["std"], values.std(axis=0, ddof=1), rtol=1e-12)
+        np.testing.assert_allclose(ensemble.rows[name]["mean"], values.mean(axis=0), rtol=1e-12)
+        np.testing.assert_allclose(
+            ensemble.rows[name]["std"], values.std(axis=0, ddof=1), rtol=1e-12
+        )
 
 
 def test_draws_and_data_go_together():
     """The same gaps in every flight, the noise of each its own."""
     draws = Draws("a", "b", seed=5, data={"gaps": [1, None, 1], "me": np.ones((MEMBERS, ROWS))})
-    found = evaluate(echo(), draws, members=MEMBERS, columns=["z"]).rows["z"]
+    found = study(echo(), MEMBERS, draws, columns=["z"]).rows["z"]
     assert found["count"].tolist() == [MEMBERS, 0, MEMBERS]
     np.testing.assert_allclose(found["mean"][[0, 2]], drawn(5)[:, 0].mean(axis=0)[[0, 2]])
 
@@ -124,10 +126,10 @@ def test_every_quantile_has_a_name_of_its_own():
     m = echo()
     m.summary("s", Last(m.table["x"].base), "", "of x")
     levels = np.linspace(0, 1, 401)
-    study = evaluate(m, Draws("a", "b"), members=MEMBERS, quantiles=[0.99999, 1, 1, *levels])
-    assert len(study.scalars.columns) == 4 + 1 + 401
+    ensemble = study(m, MEMBERS, Draws("a", "b"), quantiles=[0.99999, 1, 1, *levels])
+    assert len(ensemble.scalars.columns) == 4 + 1 + 401
     values = drawn(0)[:, 0, -1]
-    assert study.scalars.loc["s", "1 quantile"] == values.max()
-    assert study.scalars.loc["s", "0.99999 quantile"] == pytest.approx(
+    assert ensemble.scalars.loc["s", "1 quantile"] == values.max()
+    assert ensemble.scalars.loc["s", "0.99999 quantile"] == pytest.approx(
         np.quantile(values, 0.99999), rel=1e-14
     )

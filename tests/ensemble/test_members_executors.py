@@ -12,7 +12,7 @@ from multiprocessing import get_context
 import numpy as np
 import pytest
 
-from kfsheet import Draws, evaluate
+from kfsheet import Draws, study
 from kfsheet.ensemble import executors as running
 from kfsheet.ensemble.group import BATCH
 from kfsheet.evaluation.compiling import can_compile
@@ -28,10 +28,10 @@ def small_groups(monkeypatch):
     assert MANY > 2 * 16 * BATCH
 
 
-def study(executor=None):
+def asked(executor=None):
     draws = Draws("i", seed=2, data={"j": np.array(football.table["j"].values)})
     wanted = {"columns": ["e_x_a", "d_i"], "quantiles": (0.1, 0.5), "compiled": can_compile()}
-    return evaluate(football, draws, members=MANY, executor=executor, **wanted)
+    return study(football, MANY, draws, executor=executor, **wanted)
 
 
 def same(here, there):
@@ -61,21 +61,21 @@ def executors():
 
 @pytest.mark.parametrize("make", [m for _, m in executors()], ids=[n for n, _ in executors()])
 def test_whoever_computes_the_result_is_the_same_to_the_last_bit(make):
-    here = study()
+    here = asked()
     with make() as executor:
-        same(here, study(executor))
+        same(here, asked(executor))
 
 
 def test_threads_and_none_compute_the_same(monkeypatch):
-    here = study()
+    here = asked()
     monkeypatch.setattr(running, "WORTH_THREADS", 0)
     monkeypatch.setattr(running, "cores", lambda: 3)
-    same(here, study())
+    same(here, asked())
 
 
 def test_an_executor_gets_batches_not_groups():
     counting = Counting()
-    study(counting)
+    asked(counting)
     assert counting.tasks == -(-MANY // (16 * BATCH))
 
 
@@ -102,17 +102,17 @@ def test_this_process_may_use_no_more_cores_than_it_is_allowed():
 INTERRUPTED = """
 import signal, threading
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it
-from kfsheet import Draws, evaluate
+from kfsheet import Draws, study
 from kfsheet.evaluation.compiling import can_compile
 from kfsheet.exercises.cannonball import cannonball
 options = {"columns": ["NIS"], "scalars": (), "compiled": can_compile()}
-evaluate(cannonball, Draws("n_r"), members=1, **options)
+study(cannonball, 1, Draws("n_r"), **options)
 print("started", flush=True)
 try:
-    evaluate(cannonball, Draws("n_r"), members=10**7, quantiles=(0.5,), **options)
+    study(cannonball, 10**7, Draws("n_r"), quantiles=(0.5,), **options)
 except KeyboardInterrupt:
     pool = [thread for thread in threading.enumerate() if "Pool" in thread.name]
-    print(len(pool), evaluate(cannonball, members=5, **options).members, flush=True)
+    print(len(pool), study(cannonball, 5, **options).members, flush=True)
 """
 
 
@@ -150,11 +150,11 @@ def test_what_fails_in_one_group_cancels_the_others(monkeypatch):
 
     monkeypatch.setattr(running, "run_group", failing)
     with pytest.raises(RuntimeError, match="broken"):
-        evaluate(football, members=10_000, columns=["x_a"])
+        study(football, 10_000, columns=["x_a"])
     assert threading.active_count() == before
     assert len(done) < 20
     monkeypatch.undo()
-    assert evaluate(football, members=10, columns=["x_a"]).members == 10
+    assert study(football, 10, columns=["x_a"]).members == 10
 
 
 def test_the_progress_bar_waits_and_is_seen_on_terminals_only(monkeypatch, capsys):
@@ -174,15 +174,15 @@ def test_the_progress_bar_waits_and_is_seen_on_terminals_only(monkeypatch, capsy
 MEMORY = """
 import sys
 from pathlib import Path
-from kfsheet import Draws, evaluate
+from kfsheet import Draws, study
 {imports}
-evaluate({what})
+study({what})
 status = Path("/proc/self/status")  # unlike getrusage, it knows nothing of the parent
 peak = [int(line.split()[1]) for line in status.read_text().splitlines() if "VmHWM" in line]
 print(peak[0] / 1024)
 """
 
-FOOTBALLS = """football, members={members}, columns=["e_x_a"], quantiles=(0.05, 0.5, 0.95)"""
+FOOTBALLS = """football, {members}, columns=["e_x_a"], quantiles=(0.05, 0.5, 0.95)"""
 
 
 def peak(what, imports):
@@ -209,7 +209,7 @@ def test_memory_does_not_grow_with_flights_that_are_drawn():
     """A thousand flights more have 21 MB of draws and 74 MB of columns."""
     imports = "from kfsheet import NEES\nfrom kfsheet.exercises.cannonball import cannonball"
     what = (
-        'cannonball, Draws("n_theta", "n_r"), members={}, columns=["NIS", "e_x_a"], '
+        'cannonball, {}, Draws("n_theta", "n_r"), columns=["NIS", "e_x_a"], '
         'nees={{"NEES": NEES(("x", "vx", "y", "vy"))}}, quantiles=(0.5,)'
     )
     used = [peak(what.format(n), imports) for n in (500, 1500)]

@@ -13,6 +13,7 @@ from kfsheet import (
     Recurrence,
     Sum,
     evaluate,
+    study,
     t,
     when_observed,
 )
@@ -68,17 +69,17 @@ def test_what_fails_alone_fails_among_many(compiled, name):
         with pytest.raises(DataError, match=r"row|has no value"):
             evaluate(m, columns=columns, compiled=compiled)
         with pytest.raises(DataError, match="fails, member 0 has no value"):
-            evaluate(m, members=3, columns=columns, scalars=(), compiled=compiled)
+            study(m, 3, columns=columns, scalars=(), compiled=compiled)
 
 
 def test_a_member_that_diverges_is_named_and_never_left_out(compiled):
     m = model_of(lambda v, a: a * v[t - 1] ** 2, lambda v, a: v[t] * (1 - a) + v[t] / (v[t] + 1))
     values = np.full(10, 0.5)
-    study = evaluate(m, members=10, columns=["s"], a=values, compiled=compiled)
-    assert study.rows["s"]["count"].eq(10).all()
+    ensemble = study(m, 10, columns=["s"], a=values, compiled=compiled)
+    assert ensemble.rows["s"]["count"].eq(10).all()
     values[[3, 6, 9]] = 5
     with pytest.raises(DataError, match="member 3 has no value"):
-        evaluate(m, members=10, columns=["s"], a=values, compiled=compiled)
+        study(m, 10, columns=["s"], a=values, compiled=compiled)
     with pytest.raises(DataError, match="v in row"):
         evaluate(m, a=5, compiled=compiled)
 
@@ -95,7 +96,7 @@ def test_a_summary_that_overflows_is_an_error_in_every_way_of_running(compiled, 
         with pytest.raises(DataError, match=r"whole|beyond 1e308"):
             evaluate(m, a=4e307 if aggregate is Sum else 1e300, compiled=compiled)
         with pytest.raises(DataError, match="member 0 has no value"):
-            evaluate(m, members=2, a=4e307 if aggregate is Sum else 1e300, compiled=compiled)
+            study(m, 2, a=4e307 if aggregate is Sum else 1e300, compiled=compiled)
 
 
 def test_a_derived_scalar_that_overflows_is_an_error_in_every_way_of_running(compiled):
@@ -107,7 +108,7 @@ def test_a_derived_scalar_that_overflows_is_an_error_in_every_way_of_running(com
     with pytest.raises(DataError, match="b is inf"):
         evaluate(m, compiled=compiled)
     with pytest.raises(DataError, match="member 0 has no value"):
-        evaluate(m, members=2, columns=["v"], scalars=(), compiled=compiled)
+        study(m, 2, columns=["v"], scalars=(), compiled=compiled)
 
 
 def test_an_infinite_value_of_one_row_is_found_whoever_reads_it(compiled):
@@ -126,16 +127,14 @@ def test_an_infinite_value_of_one_row_is_found_whoever_reads_it(compiled):
         with pytest.raises(DataError, match="v in row 8"):
             evaluate(m, columns=["s"], compiled=compiled)
         with pytest.raises(DataError, match="member 0 has no value"):
-            evaluate(m, members=2, columns=["s"], compiled=compiled)
+            study(m, 2, columns=["s"], compiled=compiled)
 
 
 def test_a_table_of_start_rows_alone_may_lack_values(compiled):
     m = Recurrence("short", title="Short", rows=1)
     (v,) = m.columns("v", section="S")
     m.define(v[t], t + 1, "", "v", start=[Missing])
-    assert evaluate(m, members=2, columns=["v"], compiled=compiled).rows["v"]["count"].tolist() == [
-        0
-    ]
+    assert study(m, 2, columns=["v"], compiled=compiled).rows["v"]["count"].tolist() == [0]
 
 
 def test_what_no_row_asks_for_is_not_refused(compiled):
@@ -144,8 +143,8 @@ def test_what_no_row_asks_for_is_not_refused(compiled):
     a = m.parameter("a", -1, "", "a")
     (v,) = m.columns("v", section="S")
     m.define(v[t], v[t - 1] + sqrt(a), "", "v", start=[1, 2])
-    study = evaluate(m, members=2, columns=["v"], compiled=compiled)
-    assert study.rows["v"]["mean"].tolist() == [1, 2]
+    ensemble = study(m, 2, columns=["v"], compiled=compiled)
+    assert ensemble.rows["v"]["mean"].tolist() == [1, 2]
     assert evaluate(m, compiled=compiled)["v"].tolist() == [1, 2]
 
 
@@ -155,9 +154,9 @@ def test_what_was_not_observed_is_no_failure(compiled):
     v, w = m.columns("v", "w", section="S")
     m.define(v[t], when_observed(y[t], 2 * y[t]), "", "v")
     m.define(w[t], when_observed(v[t], v[t], 7), "", "w", start=[Missing])
-    study = evaluate(m, members=3, columns=["v", "w"], compiled=compiled)
-    assert study.rows["v"]["count"].tolist() == [3, 0, 3, 3]
-    assert study.rows["w"]["mean"][1:].tolist() == [7, 6, 8]
+    ensemble = study(m, 3, columns=["v", "w"], compiled=compiled)
+    assert ensemble.rows["v"]["count"].tolist() == [3, 0, 3, 3]
+    assert ensemble.rows["w"]["mean"][1:].tolist() == [7, 6, 8]
     assert evaluate(m, compiled=compiled)["w"][1:].tolist() == [7, 6, 8]
 
 
@@ -169,4 +168,4 @@ def test_a_member_without_a_value_is_named(compiled):
     values = np.ones(100)
     values[83] = -1
     with pytest.raises(DataError, match="member 83 has no value"):
-        evaluate(m, members=100, columns=["v"], a=values, compiled=compiled)
+        study(m, 100, columns=["v"], a=values, compiled=compiled)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from sympy import Piecewise, sqrt
 
-from kfsheet import NEES, DataError, Draws, ModelError, Recurrence, evaluate, t
-from kfsheet.ensemble.draws import normalised
+from kfsheet import NEES, DataError, Draws, ModelError, Recurrence, evaluate, study, t
+from kfsheet.ensemble.nees import normalised
 from kfsheet.exercises.cannonball import cannonball
 from kfsheet.exercises.shuttlecock import shuttlecock
 
@@ -30,13 +30,13 @@ def nees_of_one(run, states, row):
 
 def test_the_order_of_the_states_makes_no_difference():
     orders = {"".join(order): NEES(order) for order in permutations(NAMES)}
-    study = evaluate(cannonball, DRAWS, members=1, nees=orders)
+    ensemble = study(cannonball, 1, DRAWS, nees=orders)
     draws = DRAWS.of(0, cannonball.rows)
     run = evaluate(cannonball, {"n_theta": draws[0], "n_r": draws[1]})
     for row in (0, 1, 700, 1319):
         expected = nees_of_one(run, NAMES, row)
         for name in orders:
-            assert study.rows[name]["mean"][row] == pytest.approx(expected, rel=1e-6), name
+            assert ensemble.rows[name]["mean"][row] == pytest.approx(expected, rel=1e-6), name
 
 
 def test_states_that_nothing_connects_are_independent():
@@ -46,7 +46,7 @@ def test_states_that_nothing_connects_are_independent():
     ]
     assert len(states) > 1
     spec = {"all": NEES(states), **{s: NEES([s]) for s in states}}
-    rows = evaluate(shuttlecock, members=1, nees=spec).rows
+    rows = study(shuttlecock, 1, nees=spec).rows
     run = evaluate(shuttlecock)
     for row in (1, 10, 20):
         expected = nees_of_one(run, states, row)
@@ -69,15 +69,15 @@ def test_a_covariance_without_a_column_is_refused_unless_it_follows_or_is_declar
     with pytest.raises(
         ModelError, match=r"neither P_ac_a nor P_ca_a.*independent=\[\('a', 'c'\)\]"
     ):
-        evaluate(m, members=1, nees={"N": NEES(("a", "b", "c"))})
+        study(m, 1, nees={"N": NEES(("a", "b", "c"))})
     spec = NEES(("a", "b", "c"), independent=[("c", "a")])
     P, e = np.array([[4, 1, 0], [1, 4, 1], [0, 1, 4]]), np.array([1, 2, 3])
-    found = evaluate(m, members=1, nees={"N": spec}).rows["N"]["mean"]
+    found = study(m, 1, nees={"N": spec}).rows["N"]["mean"]
     np.testing.assert_allclose(found, e @ np.linalg.inv(P) @ e, rtol=1e-14)
-    alone = evaluate(claims("P_aa_a", "P_bb_a"), members=1, nees={"N": NEES(("a", "b"))})
+    alone = study(claims("P_aa_a", "P_bb_a"), 1, nees={"N": NEES(("a", "b"))})
     np.testing.assert_allclose(alone.rows["N"]["mean"], 1 / 4 + 4 / 4)
     with pytest.raises(ModelError, match="needs the column P_cc_a"):
-        evaluate(claims("P_aa_a"), members=1, nees={"N": NEES(("a", "c"))})
+        study(claims("P_aa_a"), 1, nees={"N": NEES(("a", "c"))})
 
 
 def test_elimination_agrees_with_inverses_of_random_covariances():
@@ -93,7 +93,7 @@ def test_elimination_agrees_with_inverses_of_random_covariances():
 
 def test_a_state_that_is_known_exactly_has_no_nees_in_that_row():
     m = claims("P_aa_a", "P_bb_a", "P_ab_a", values={"P_aa_a": [0, 4, 4], "P_ab_a": [0, 1, 4]})
-    found = evaluate(m, members=2, nees={"N": NEES(("a", "b"))}).rows["N"]
+    found = study(m, 2, nees={"N": NEES(("a", "b"))}).rows["N"]
     assert found["count"].tolist() == [0, 2, 0]  # known; sound; both the same, a singular P
     assert np.isnan(found["mean"][[0, 2]]).all()
     P, e = np.array([[4, 1], [1, 4]]), np.array([1, 2])
@@ -109,6 +109,6 @@ def test_a_member_whose_covariance_is_none_is_named():
         m.define(column[t], t + 1, "", "any")
     m.define(P_ab[t], Piecewise((rho * sqrt(P_aa[t] * P_bb[t]), t > 1), (0, True)), "", "any")
     spec = {"N": NEES(("a", "b"))}
-    assert evaluate(m, members=3, nees=spec, rho=[0, 0.5, -0.9]).rows["N"]["count"].eq(3).all()
+    assert study(m, 3, nees=spec, rho=[0, 0.5, -0.9]).rows["N"]["count"].eq(3).all()
     with pytest.raises(DataError, match="member 2: P in row 2 is no covariance"):
-        evaluate(m, members=3, nees=spec, rho=[0, 0.5, -1.5])
+        study(m, 3, nees=spec, rho=[0, 0.5, -1.5])

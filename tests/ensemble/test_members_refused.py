@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kfsheet import NEES, DataError, Draws, ModelError, evaluate
+from kfsheet import NEES, DataError, Draws, ModelError, Recurrence, evaluate, study
 from kfsheet.exercises.football import football
 
 
@@ -23,12 +23,6 @@ from kfsheet.exercises.football import football
         ({"members": 3, "data": Draws("q")}, "no data column q"),
         ({"members": 2, "data": {"i": np.full((2, 16), np.inf)}}, "member 0, row 0 is inf"),
         ({"members": 2, "nees": {"N": NEES(("q",))}}, "no column 'e_q_a'|lacks"),
-        ({"quantiles": (0.5,)}, "give members="),
-        ({"data": Draws("i")}, "data is a Draws; give members="),
-        ({"data": [1, 2]}, "data is a list; give {name: values}"),
-        ({"data": {"i": np.ones((3, 16))}}, "i has values for many runs; give members="),
-        ({"r_i": [1, 2]}, "r_i has values for many runs; give members="),
-        ({"columns": "x_a"}, r"columns is the text 'x_a'; give a list: \['x_a'\]"),
         ({"members": True}, "members is True"),
         ({"members": 3, "columns": "x_a"}, "columns is the text 'x_a'"),
         ({"members": 3, "scalars": "rms_x_a"}, "scalars is the text 'rms_x_a'"),
@@ -50,13 +44,38 @@ from kfsheet.exercises.football import football
     ],
 )
 def test_a_study_that_cannot_be_is_refused(options, message):
-    data = options.pop("data", None)
     with pytest.raises((DataError, ModelError), match=message):
-        evaluate(football, data, **options)
+        study(football, **options)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"members": 3}, r"takes no members; many runs are study\(model, members, data"),
+        ({"quantiles": (0.5,)}, "takes no quantiles; many runs are study"),
+        ({"scalars": ["rms_x_a"]}, "takes no scalars; many runs are study"),
+        ({"nees": {}}, "takes no nees; many runs are study"),
+        ({"executor": None}, "takes no executor; many runs are study"),
+        ({"data": Draws("i")}, r"data is a Draws; call study\(model, members, data\)"),
+        ({"data": [1, 2]}, "data is a list; give {name: values}"),
+        ({"data": {"i": np.ones((3, 16))}}, "i has values for many runs; call study"),
+        ({"r_i": [1, 2]}, "r_i has values for many runs; call study"),
+        ({"columns": "x_a"}, r"columns is the text 'x_a'; give a list: \['x_a'\]"),
+    ],
+)
+def test_one_run_tells_who_wants_many_what_to_call(options, message):
+    with pytest.raises(DataError, match=message):
+        evaluate(football, **options)
+
+
+@pytest.mark.parametrize("name", ["members", "scalars", "quantiles", "nees", "executor"])
+def test_no_parameter_is_called_like_an_option_of_a_study(name):
+    with pytest.raises(ModelError, match="kfsheet uses this name itself"):
+        Recurrence("taken", title="Taken", rows=3).parameter(name, 1, "", "taken")
 
 
 def test_whole_numbers_of_numpy_are_whole_numbers():
-    assert evaluate(football, members=np.int64(2), columns=["x_a"], scalars=()).members == 2
+    assert study(football, np.int64(2), columns=["x_a"], scalars=()).members == 2
 
 
 @pytest.mark.parametrize("states", ["x", (), (1,), ("x", "x")])
@@ -67,7 +86,7 @@ def test_nees_needs_names_of_states(states):
 
 @pytest.mark.parametrize("compiled", [True, False])
 def test_a_study_may_ask_for_nothing(compiled):
-    study = evaluate(football, members=3, columns=[], scalars=(), compiled=compiled)
-    assert study.members == 3
-    assert not study.rows
-    assert not len(study.scalars)
+    ensemble = study(football, 3, columns=[], scalars=(), compiled=compiled)
+    assert ensemble.members == 3
+    assert not ensemble.rows
+    assert not len(ensemble.scalars)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from sympy import Abs, Max, Mod, Rational, ceiling, floor, sign
 
-from kfsheet import Count, DataError, Largest, Recurrence, evaluate, t, when_observed
+from kfsheet import Count, DataError, Largest, Recurrence, evaluate, study, t, when_observed
 
 ROWS = 12
 GAP = 5
@@ -85,8 +85,8 @@ def ways(m):
 
     def many(compiled, **parameters):
         options = {"columns": wanted, "compiled": compiled, "scalars": ()}
-        study = evaluate(m, members=11, **options, **parameters)
-        return np.column_stack([study.rows[name]["mean"] for name in wanted])
+        ensemble = study(m, 11, **options, **parameters)
+        return np.column_stack([ensemble.rows[name]["mean"] for name in wanted])
 
     return {
         "single": lambda: single(True),

@@ -24,17 +24,18 @@ from kfsheet import (
     Std,
     Sum,
     evaluate,
+    study,
     t,
     warm_up,
     when_observed,
 )
 from kfsheet.ensemble import executors
 from kfsheet.errors import EngineError, WorkbookError
-from kfsheet.evaluation import compiling, prepared
+from kfsheet.evaluation import compiling, model_cache
 from kfsheet.evaluation import evaluate as evaluation
 from kfsheet.evaluation.compiling import compiled_function, is_ready
 from kfsheet.evaluation.kernel import kernel_of
-from kfsheet.evaluation.prepared import facts_of
+from kfsheet.evaluation.model_cache import cache_of
 from kfsheet.exercises.cannonball import cannonball
 from kfsheet.exercises.football import football
 
@@ -139,7 +140,7 @@ def test_neither_a_first_run_nor_a_small_study_waits_for_a_compiler(compilers):
     evaluate(model)
     evaluate(model, columns=["v"])
     for _ in range(20):
-        evaluate(model, members=10, columns=["v"])
+        study(model, 10, columns=["v"])
     assert compilers == ([], [])
 
 
@@ -149,18 +150,18 @@ def test_after_some_runs_another_process_compiles_what_is_run_often_and_nothing_
     model, cells = unlike(2), ROWS * 2
     monkeypatch.setattr(compiling, "COMPILING", 5 * cells)
     monkeypatch.setattr(compiling, "LOADING", 2 * cells)
-    monkeypatch.setattr(prepared, "LOADING", 2 * cells)
+    monkeypatch.setattr(model_cache, "LOADING", 2 * cells)
     for _ in range(4):
         evaluate(model)
     assert compilers == ([], [])
     evaluate(model)
     assert compilers == ([], [kernel_of(model, model.version, ("v", "w")).source])
     evaluate(model, columns=["v"])  # its own kernel, run once
-    study = kernel_of(model, model.version, ("w",)).source
-    evaluate(model, members=4, columns=["w"])
-    assert study not in compilers[1]
-    evaluate(model, members=4, columns=["w"])
-    assert study in compilers[1]
+    of_study = kernel_of(model, model.version, ("w",)).source
+    study(model, 4, columns=["w"])
+    assert of_study not in compilers[1]
+    study(model, 4, columns=["w"])
+    assert of_study in compilers[1]
     assert not compilers[0]
 
 
@@ -169,9 +170,9 @@ def test_who_asks_for_much_waits_and_who_says_so_never_or_always(compilers, monk
     source = kernel_of(model, model.version, ("v", "w")).source
     monkeypatch.setattr(compiling, "WAITING", ROWS * 2)
     monkeypatch.setattr(compiling, "LOADING", 0)
-    monkeypatch.setattr(prepared, "LOADING", 0)
+    monkeypatch.setattr(model_cache, "LOADING", 0)
     evaluate(model, compiled=False)
-    evaluate(model, members=2, compiled=False)
+    study(model, 2, compiled=False)
     assert compilers == ([], [])
     evaluate(model)
     assert compilers == ([source], [])
@@ -185,10 +186,10 @@ def test_python_goes_on_until_the_other_process_is_done(monkeypatch):
     model = unlike(4)
     monkeypatch.setattr(compiling, "COMPILING", 1)
     monkeypatch.setattr(compiling, "LOADING", 1)
-    monkeypatch.setattr(prepared, "LOADING", 1)
+    monkeypatch.setattr(model_cache, "LOADING", 1)
     python = evaluate(model, compiled=False)
     end, runs = time.monotonic() + 120, 0
-    while not facts_of(model).kernels and time.monotonic() < end:
+    while not cache_of(model).kernels and time.monotonic() < end:
         assert_same(evaluate(model), python, 1e-13)
         runs += 1
     assert runs > 1
@@ -203,7 +204,7 @@ def test_a_compiler_that_fails_is_told_of_once_and_python_goes_on(monkeypatch):
     monkeypatch.setattr(compiling, "_BACKGROUND", background)
     for name in ("LOADING", "COMPILING"):
         monkeypatch.setattr(compiling, name, 1)
-    monkeypatch.setattr(prepared, "LOADING", 1)
+    monkeypatch.setattr(model_cache, "LOADING", 1)
     evaluate(model)
     background._process.wait()
     with pytest.warns(RuntimeWarning, match="the compiler failed, so Python goes on"):
@@ -249,9 +250,9 @@ def test_threads_that_ask_at_once_get_one_function(source, cache):
 def test_a_machine_without_a_compiler_says_so(monkeypatch):
     for module in (compiling, evaluation):
         monkeypatch.setattr(module, "can_compile", lambda: False)
-    for options in ({}, {"members": 3}):
+    for ask in (evaluate, lambda model, **options: study(model, 3, **options)):
         with pytest.raises(EngineError, match=r"install kfsheet\[fast\], or compiled=False"):
-            evaluate(small(), compiled=True, **options)
+            ask(small(), compiled=True)
     warm_up(small())
 
 
@@ -264,7 +265,7 @@ def test_a_study_says_when_it_waits_for_the_compiler(monkeypatch, cache):
 
     monkeypatch.setattr(executors, "_bar", watched)
     for _ in range(2):
-        evaluate(small(), members=3, compiled=True)
+        study(small(), 3, compiled=True)
     assert said == ["compiling"]
 
 

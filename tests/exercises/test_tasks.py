@@ -8,19 +8,19 @@ from sympy import Indexed
 
 from kfsheet import load_exercise
 from kfsheet.coursework.handout.handouts import handout_pages, own_run
-from kfsheet.coursework.handout.questions import question_pages
-from kfsheet.coursework.handout.variation import own_numbers
+from kfsheet.coursework.handout.own_numbers import own_numbers
+from kfsheet.coursework.handout.questions_sheet import question_pages
 from kfsheet.exercises import exercise_names
 from kfsheet.model.expressions import Missing
-from kfsheet.workbook.write.contents import Run
 from kfsheet.workbook.write.layout import Layout
+from kfsheet.workbook.write.run import Run
 
 
 def words_told(exercise):
     """The words on a student's sheet of questions: task, hints, names of the answers."""
     layout, own = Layout.standard(exercise.model), own_numbers(exercise, SECRET, ADA.id)
     page, _ = question_pages(exercise, layout, own_run(exercise, own), SECRET, (ADA.id, ADA.name))
-    texts = [p.content for p in page.pieces.values() if isinstance(p.content, str)]
+    texts = [p.content for p in page.cells.values() if isinstance(p.content, str)]
     return set(re.findall(r"[A-Za-z]\w*", " ".join(t for t in texts if not t.startswith("="))))
 
 
@@ -53,4 +53,4 @@ def test_what_looks_like_an_answer_in_a_sealed_worksheet_is_live_and_not_shown(n
     for page in pages:
         kinds = {filled.kind for filled in page.columns.values() if filled.rules}
         assert kinds <= {"veiled", "index"}
-        assert any(piece.kind == "answer" for piece in page.pieces.values())
+        assert any(piece.kind == "answer" for piece in page.cells.values())

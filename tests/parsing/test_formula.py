@@ -10,8 +10,9 @@ from sympy import Piecewise, Rational
 
 from kfsheet.errors import FormulaError, PrintError
 from kfsheet.model.expressions import Count, Mean, Missing, Observed, SumProduct, t
-from kfsheet.parsing.formula import parse_formula, read_formula
+from kfsheet.parsing.formula import read_formula
 from kfsheet.parsing.references import read_reference, relative_key
+from kfsheet.parsing.syntax import parse_formula
 from kfsheet.printing.excel import excel_code
 
 x, y, z = VARIABLES

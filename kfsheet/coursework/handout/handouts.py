@@ -16,8 +16,9 @@ from openpyxl.workbook import Workbook
 from openpyxl.worksheet.dimensions import ColumnDimension
 from openpyxl.worksheet.worksheet import Worksheet
 
-from kfsheet.coursework.handout import tokens
-from kfsheet.coursework.handout.questions import (
+from kfsheet.coursework.handout import course_secret
+from kfsheet.coursework.handout.own_numbers import own_numbers
+from kfsheet.coursework.handout.questions_sheet import (
     FIRST,
     HIDDEN,
     LOOKS_RIGHT,
@@ -25,24 +26,24 @@ from kfsheet.coursework.handout.questions import (
     hide,
     question_pages,
 )
-from kfsheet.coursework.handout.variation import own_numbers
 from kfsheet.coursework.judging.judge import asked_steps
-from kfsheet.coursework.judging.workers import Failed, Pool
-from kfsheet.coursework.judging.worlds import Own
-from kfsheet.coursework.reading.belonging import belongs_to, claim
+from kfsheet.coursework.judging.random_samples import OwnNumbers
+from kfsheet.coursework.judging.worker_pool import Failed, Pool
+from kfsheet.coursework.reading.results_folder import belongs_to, claim
 from kfsheet.coursework.reading.roster import Student
 from kfsheet.errors import DataError, ModelError, WorkbookError
 from kfsheet.exercises import load_exercise
 from kfsheet.files import write_file
 from kfsheet.model.exercise import Exercise
 from kfsheet.printing.excel_names import LAST_COLUMN
-from kfsheet.workbook.engines.ironcalc import Values
 from kfsheet.workbook.engines.recalculate import recalculate
-from kfsheet.workbook.write.contents import Run
+from kfsheet.workbook.engines.spreadsheet_engine import Values
 from kfsheet.workbook.write.layout import FIRST_ROW, Layout
-from kfsheet.workbook.write.page import Page, Piece, is_formula
+from kfsheet.workbook.write.openpyxl_workbook import WorkbookTemplate, assemble
+from kfsheet.workbook.write.run import Run
+from kfsheet.workbook.write.sheet import Cell, Sheet, is_formula
 from kfsheet.workbook.write.styles import LEGEND
-from kfsheet.workbook.write.workbook import Shell, assemble, built_bytes, compose
+from kfsheet.workbook.write.write_workbook import compose, workbook_bytes
 
 TOKEN_PROPERTY = "kfsheet token"
 YOURS = (
@@ -75,7 +76,7 @@ def write_handouts(
     students : list of Student
         Who gets one.
     secret : bytes
-        See :mod:`kfsheet.coursework.handout.tokens`.
+        See :mod:`kfsheet.coursework.handout.course_secret`.
     out : path
         Folder; ``students/ID/EXERCISE.xlsx`` and ``solutions/ID/EXERCISE.xlsx`` are written there.
     jobs : int
@@ -99,7 +100,7 @@ def write_handouts(
     """
     if not exercise.questions:
         raise ModelError(f"{exercise.name} asks no questions; list them in Exercise(questions=...)")
-    if not claim(out, "secret", tokens.fingerprint(secret)):
+    if not claim(out, "secret", course_secret.fingerprint(secret)):
         raise DataError(
             f"{out} holds handouts made with another secret; give that --secret, or another --out"
         )
@@ -138,14 +139,14 @@ def _write_both(
     return write_file(path, content)
 
 
-def own_run(exercise: Exercise, own: Own) -> Run:
+def own_run(exercise: Exercise, own: OwnNumbers) -> Run:
     """The model with a student's numbers."""
     return Run.of(exercise.model, dict(own.data), dict(own.parameters))
 
 
-def solution_bytes(exercise: Exercise, own: Own) -> bytes:
+def solution_bytes(exercise: Exercise, own: OwnNumbers) -> bytes:
     """The complete workbook with a student's numbers."""
-    return built_bytes(exercise, Layout.standard(exercise.model), own_run(exercise, own))
+    return workbook_bytes(exercise, own_run(exercise, own))
 
 
 def handout_bytes(exercise: Exercise, student: Student, secret: bytes) -> bytes:
@@ -156,13 +157,13 @@ def handout_bytes(exercise: Exercise, student: Student, secret: bytes) -> bytes:
     pages[1:1] = question_pages(exercise, layout, now, secret, (student.id, student.name))
     pages.append(pages.pop(2))  # the hidden sheet last
     book = assemble(exercise, layout, pages, now)
-    _finish_book(book, pages, exercise, tokens.token(secret, exercise.name, student.id))
-    shell = Shell(book, pages)
+    _finish_book(book, pages, exercise, course_secret.token(secret, exercise.name, student.id))
+    shell = WorkbookTemplate(book, pages)
     _store(pages, _calculated(shell.filled(pages)))
     return shell.filled(pages)
 
 
-def handout_pages(exercise: Exercise, layout: Layout, now: Run) -> list[Page]:
+def handout_pages(exercise: Exercise, layout: Layout, now: Run) -> list[Sheet]:
     """The exercise's worksheets with empty answers, without "Check", which knows the answers."""
     words = replace(exercise, about=(YOURS, exercise.about[0]), notebook="")
     pages = [p for p in compose(words, layout, now, now) if p.title != "Check"]
@@ -183,8 +184,8 @@ def handout_pages(exercise: Exercise, layout: Layout, now: Run) -> list[Page]:
     for name in exercise.veiled:
         if name in layout.scalars:
             sheet, *place = layout.scalars[name]
-            piece = by_title[sheet].at(*place)
-            by_title[sheet].pieces[tuple(place)] = piece._replace(kind="veiled")
+            piece = by_title[sheet].cell_at(*place)
+            by_title[sheet].cells[tuple(place)] = piece._replace(kind="veiled")
             continue
         sheet, column = layout.home(name)
         _veil(by_title[sheet], column)
@@ -193,35 +194,35 @@ def handout_pages(exercise: Exercise, layout: Layout, now: Run) -> list[Page]:
     return pages
 
 
-def _empty(page: Page, place: tuple[int, int]) -> None:
-    page.pieces[place] = Piece(None, "answer", format=page.at(*place).format)
+def _empty(page: Sheet, place: tuple[int, int]) -> None:
+    page.cells[place] = Cell(None, "answer", format=page.cell_at(*place).format)
 
 
-def _freeze(page: Page) -> None:
+def _freeze(page: Sheet) -> None:
     """Numbers in the place of formulas that are those of an answer."""
     for at, filled in page.columns.items():
         if filled.rules:
             page.columns[at] = replace(filled, kind="data", rules=())
 
 
-def _seal(page: Page) -> None:
+def _seal(page: Sheet) -> None:
     for at, filled in page.columns.items():
         if filled.rules and filled.kind == "formula":
             _veil(page, at)
 
 
-def _veil(page: Page, at: int) -> None:
+def _veil(page: Sheet, at: int) -> None:
     """Formulas stay, and are not shown while the sheet is locked."""
     page.columns[at] = replace(page.columns[at], kind="veiled")
 
 
-def _mend_parameters(page: Page) -> None:
+def _mend_parameters(page: Sheet) -> None:
     page.put(2, 1, "These are your own numbers; everything follows from them.")
 
 
-def _mend_read_me(page: Page) -> None:
+def _mend_read_me(page: Sheet) -> None:
     """The words about the sheet "Check", which handouts lack, become words about the questions."""
-    for (row, column), piece in list(page.pieces.items()):
+    for (row, column), piece in list(page.cells.items()):
         if piece.content in LOCKED:
             page.put(row, column, LOCKED[piece.content], align="wrap")
         if piece.content == "Check" and piece.kind == "index":
@@ -232,7 +233,7 @@ def _mend_read_me(page: Page) -> None:
             page.put(row + 1, 2, "an answer: fill in a formula", align="wrap")
 
 
-def _finish_book(book: Workbook, pages: list[Page], exercise: Exercise, token: str) -> None:
+def _finish_book(book: Workbook, pages: list[Sheet], exercise: Exercise, token: str) -> None:
     book.custom_doc_props.append(StringProperty(name=TOKEN_PROPERTY, value=token))
     fill = PatternFill("solid", start_color="FFC6EFCE", end_color="FFC6EFCE")
     rule = CellIsRule(operator="equal", formula=[f'"{LOOKS_RIGHT}"'], fill=fill)
@@ -270,13 +271,13 @@ def _calculated(content: bytes) -> Values:
         return recalculate(path)
 
 
-def _store(pages: list[Page], values: Values) -> None:
+def _store(pages: list[Sheet], values: Values) -> None:
     """Put an engine's values in the place of the key's, which would give the answers away."""
     for page in pages:
         found = values[page.title]
-        for place, piece in page.pieces.items():
+        for place, piece in page.cells.items():
             if is_formula(piece.content):
-                page.pieces[place] = piece._replace(stored=found.get(place, ""))
+                page.cells[place] = piece._replace(stored=found.get(place, ""))
         for at, filled in page.columns.items():
             if filled.rules:
                 kept = [found.get((row, at), "") for row in filled.rows]

@@ -9,9 +9,9 @@ from functools import lru_cache
 
 from sympy import Basic, Indexed, Number, Rational
 
-from kfsheet.coursework.judging.comparing import ROUGH, Question, question
-from kfsheet.coursework.judging.mutations import MOST, mutations
-from kfsheet.coursework.judging.worlds import Own, Scene
+from kfsheet.coursework.judging.answer_key import ROUGH, AnswerKey, answer_key
+from kfsheet.coursework.judging.random_samples import OwnNumbers, Sampler
+from kfsheet.coursework.judging.typical_mistakes import MOST, typical_mistakes
 from kfsheet.model.expressions import t
 from kfsheet.model.recurrence import Recurrence
 from kfsheet.model.validation import walk
@@ -30,9 +30,9 @@ NEAR = 0.01
 
 
 @lru_cache(maxsize=200_000)
-def is_right(scene: Scene, name: str, step: int, expression: Basic) -> bool:
+def is_right(sampler: Sampler, name: str, step: int, expression: Basic) -> bool:
     """Whether an expression is the key's function in a step."""
-    return question(scene, name, step).same(expression)
+    return answer_key(sampler, name, step).same(expression)
 
 
 def judged_in(model: Recurrence, name: str, step: int, expression: Basic) -> list[int]:
@@ -60,15 +60,15 @@ def digest_of(name: str, values: Sequence[str]) -> str:
 
 @lru_cache(maxsize=20_000)
 def diagnose(
-    scene: Scene, name: str, steps: tuple[int, ...], expression: Basic, own: Own
+    sampler: Sampler, name: str, steps: tuple[int, ...], expression: Basic, own: OwnNumbers
 ) -> tuple[str, str, str]:
     """Status, words and fingerprint of a formula that is wrong in one of the steps."""
-    step = next((k for k in steps if not is_right(scene, name, k, expression)), steps[0])
-    asked = question(scene, name, step)
+    step = next((k for k in steps if not is_right(sampler, name, k, expression)), steps[0])
+    asked = answer_key(sampler, name, step)
     values = asked.values(expression)
     fingerprint = digest_of(name, values)
-    everywhere = [question(scene, name, k) for k in steps]
-    parameters = Own(own.parameters)
+    everywhere = [answer_key(sampler, name, k) for k in steps]
+    parameters = OwnNumbers(own.parameters)
     if _has_a_number(asked, expression) and all(q.same(expression, parameters) for q in everywhere):
         names = _still(asked, expression, own) or ["a parameter"]
         many = len(names) > 1
@@ -85,17 +85,17 @@ def diagnose(
     if all(q.nearly(expression) for q in everywhere):
         words = f"most values lie within {100 * ROUGH:g} % of the right ones, and are not equal"
         return NEARLY, words, fingerprint
-    return WRONG, _words_of(scene, name, step, expression, values), fingerprint
+    return WRONG, _words_of(sampler, name, step, expression, values), fingerprint
 
 
-def _has_a_number(asked: Question, expression: Basic) -> bool:
+def _has_a_number(asked: AnswerKey, expression: Basic) -> bool:
     """Whether something that the key reads is missing, so that a number may stand for it."""
     return bool(expression.atoms(Number) - asked.key.atoms(Number)) or bool(
         asked.key.free_symbols - expression.free_symbols
     )
 
 
-def _rounded(everywhere: list[Question], expression: Basic, own: Own) -> str:
+def _rounded(everywhere: list[AnswerKey], expression: Basic, own: OwnNumbers) -> str:
     """Words, if the formula is right where one parameter has a number near its own value."""
     typed = {abs(float(c)) for c in expression.atoms(Rational)}
     typed |= {2 * c for c in typed}  # half of a number is left of it where it is multiplied by 1/2
@@ -105,37 +105,39 @@ def _rounded(everywhere: list[Question], expression: Basic, own: Own) -> str:
             near = math.copysign(number, value)
             if near == value or not math.isclose(near, value, rel_tol=NEAR):
                 continue
-            if all(q.same(expression, Own((*others, (name, near)))) for q in everywhere):
+            if all(q.same(expression, OwnNumbers((*others, (name, near)))) for q in everywhere):
                 words = f"{near:.10g} stands in the place of {name}, which is {value:.10g}"
                 return f"{words}: refer to its cell"
     return ""
 
 
-def _still(asked: Question, expression: Basic, own: Own) -> list[str]:
+def _still(asked: AnswerKey, expression: Basic, own: OwnNumbers) -> list[str]:
     """Parameters that the formula should follow and does not."""
     found = []
     for name, _ in own.parameters:
-        others = Own(tuple(p for p in own.parameters if p[0] != name))
+        others = OwnNumbers(tuple(p for p in own.parameters if p[0] != name))
         if not asked.same(expression, others):
             found.append(name)
     return found
 
 
-def _words_of(scene: Scene, name: str, step: int, expression: Basic, values: Sequence[str]) -> str:
-    if name in scene.model.table and expression.has(scene.model[name][t]):
+def _words_of(
+    sampler: Sampler, name: str, step: int, expression: Basic, values: Sequence[str]
+) -> str:
+    if name in sampler.model.table and expression.has(sampler.model[name][t]):
         return "the formula refers to its own cell"
-    if name in scene.model.derived_scalars and expression.has(scene.model[name]):
+    if name in sampler.model.derived_scalars and expression.has(sampler.model[name]):
         return "the formula refers to its own cell"
-    known = known_mistakes(scene, name, step).get(tuple(values))
+    known = known_mistakes(sampler, name, step).get(tuple(values))
     return known or PLAIN_WORDS[WRONG]
 
 
 @lru_cache(maxsize=2_000)
-def known_mistakes(scene: Scene, name: str, step: int) -> dict[tuple[str, ...], str]:
+def known_mistakes(sampler: Sampler, name: str, step: int) -> dict[tuple[str, ...], str]:
     """Words by the values that a mutated key has; without those that change nothing."""
-    asked = question(scene, name, step)
+    asked = answer_key(sampler, name, step)
     found: dict[tuple[str, ...], str] = {}
-    for n, (words, key) in enumerate(mutations(scene.model, asked.key)):
+    for n, (words, key) in enumerate(typical_mistakes(sampler.model, asked.key)):
         if n >= MOST:
             break
         found.setdefault(asked.values(key), words)

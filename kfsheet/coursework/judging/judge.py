@@ -15,8 +15,8 @@ from itertools import pairwise
 from openpyxl.utils import get_column_letter
 from sympy import Basic, Indexed
 
-from kfsheet.coursework.judging.circles import find_circle
-from kfsheet.coursework.judging.comparing import question
+from kfsheet.coursework.judging.answer_key import answer_key
+from kfsheet.coursework.judging.circular_references import circular_reference
 from kfsheet.coursework.judging.diagnosis import (
     EMPTY,
     GAPS,
@@ -36,14 +36,13 @@ from kfsheet.coursework.judging.diagnosis import (
     is_right,
     judged_in,
 )
-from kfsheet.coursework.judging.meaning import Interpreter, parsed
-from kfsheet.coursework.judging.worlds import Own, Scene
-from kfsheet.coursework.reading.places import Places
+from kfsheet.coursework.judging.formula_meaning import Interpreter, parsed
+from kfsheet.coursework.judging.random_samples import OwnNumbers, Sampler
+from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.coursework.reading.submission import Book
 from kfsheet.coursework.reading.worksheet import Formula
 from kfsheet.errors import ForbiddenError, FormulaError
-from kfsheet.model.exercise import Exercise
-from kfsheet.model.exercise import Question as Asked
+from kfsheet.model.exercise import Exercise, Question
 from kfsheet.model.expressions import Aggregate, Missing, lag, t
 from kfsheet.model.recurrence import Recurrence
 from kfsheet.model.validation import columns_read
@@ -99,12 +98,17 @@ class Judge:
     """Judges one workbook."""
 
     def __init__(
-        self, exercise: Exercise, scene: Scene, book: Book, own: Own, recalculated: Recalculated
+        self,
+        exercise: Exercise,
+        sampler: Sampler,
+        book: Book,
+        own: OwnNumbers,
+        recalculated: Recalculated,
     ) -> None:
-        self._model, self._scene, self._own = exercise.model, scene, own
+        self._model, self._sampler, self._own = exercise.model, sampler, own
         self.book, self._recalculated = book, recalculated
-        self.places = Places.find(book, exercise.model)
-        self._interpreter = Interpreter(book, self.places)
+        self.addresses = CellAddresses.find(book, exercise.model)
+        self._interpreter = Interpreter(book, self.addresses)
         self._exercise = exercise
         self._starts: dict[str, int] = {}
         self._verdicts: dict[tuple, tuple[str, str]] = {}
@@ -113,7 +117,7 @@ class Judge:
         """One mark for each question."""
         return [self._mark(asked) for asked in self._exercise.questions]
 
-    def _mark(self, asked: Asked) -> Mark:
+    def _mark(self, asked: Question) -> Mark:
         cells = [self._read(asked.name, step) for step in asked_steps(self._model, asked.name)]
         if any(cell is None for cell in cells):
             words = "the table or the label of this answer is gone; hand in a file that has it"
@@ -124,7 +128,7 @@ class Judge:
         return self._marked(asked, cells)
 
     def _read(self, name: str, step: int) -> Cell | None:
-        address = self.places.address(name, step)
+        address = self.addresses.of(name, step)
         if address is None:
             return None
         content = self.book.sheets[address[0]].get(address[1:])
@@ -166,15 +170,15 @@ class Judge:
         if repeated := self._repeats(name, cell):
             return WRONG, f"{repeated} repeats the answer; derive it"
         steps = judged_in(self._model, name, cell.step, cell.expression)
-        right = all(is_right(self._scene, name, step, cell.expression) for step in steps)
+        right = all(is_right(self._sampler, name, step, cell.expression) for step in steps)
         if right and asks_for_its_row(self._model, cell.expression):
-            own = Own(self._own.parameters)  # a time is met exactly only with the own parameters
-            right = question(self._scene, name, cell.step).same(cell.expression, own)
+            own = OwnNumbers(self._own.parameters)  # only with these is a time met exactly
+            right = answer_key(self._sampler, name, cell.step).same(cell.expression, own)
         return RIGHT if right else WRONG, ""
 
     def _repeats(self, name: str, cell: Cell) -> str:
         """A column that hides the answer's own formula, if this one reads it unlike the key."""
-        key = question(self._scene, name, cell.step).key
+        key = answer_key(self._sampler, name, cell.step).key
         given = columns_read(cell.expression) - columns_read(key)
         return next((column for column in self._exercise.veiled if column in given), "")
 
@@ -184,7 +188,7 @@ class Judge:
 
     # -- from cells to a mark --------------------------------------------------------------
 
-    def _marked(self, asked: Asked, cells: list[Cell]) -> Mark:
+    def _marked(self, asked: Question, cells: list[Cell]) -> Mark:
         right = [c for c in cells if c.status == RIGHT]
         rest = [c for c in cells if c.status != RIGHT]
         if not rest:
@@ -216,9 +220,9 @@ class Judge:
         if culprit.words:
             return WRONG, culprit.words, ""
         steps = tuple(judged_in(self._model, name, culprit.step, expression))
-        status, words, fingerprint = diagnose(self._scene, name, steps, expression, self._own)
+        status, words, fingerprint = diagnose(self._sampler, name, steps, expression, self._own)
         if words == PLAIN_WORDS[WRONG]:
-            circle = find_circle(self._interpreter, self.places, name, culprit.step)
+            circle = circular_reference(self._interpreter, self.addresses, name, culprit.step)
             words = f"it goes in a circle: {' -> '.join(circle)}" if circle else words
         if status == WRONG and culprit.fixed and len(rest) > 1:
             words = f"every row refers to {self._fixed_words(culprit)}; {words}"
@@ -252,7 +256,7 @@ class Judge:
             _show(r, cell.address[1:])
             for r in fixed
             if isinstance(
-                self.places.role(
+                self.addresses.role(
                     (r.sheet or cell.address[0], r.first.row, r.first.at(cell.address[1:])[1])
                 ),
                 tuple,

@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import kfsheet
-from kfsheet.coursework.handout import tokens
+from kfsheet.coursework.handout import course_secret
 from kfsheet.coursework.judging.judge import Mark
-from kfsheet.coursework.judging.workers import SECONDS, Failed, Pool, run_on
-from kfsheet.coursework.reading.collecting import owner, submitted_files
+from kfsheet.coursework.judging.worker_pool import SECONDS, Failed, Pool, run_on
 from kfsheet.coursework.reading.roster import Student
-from kfsheet.coursework.reports.assessing import GRADED, NO_TOKEN, OTHER, Assessment, assess
+from kfsheet.coursework.reading.submitted_files import owner, submitted_files
+from kfsheet.coursework.reports.assessment import GRADED, NO_TOKEN, OTHER, Assessment, assess
 from kfsheet.files import write_file
 from kfsheet.model.exercise import Exercise
 
@@ -154,7 +154,7 @@ def _key(path: Path, version: str, secret: bytes) -> str:
     except OSError:
         content.update(str(path).encode())
     parts = ("key", version, kfsheet.__version__, content.hexdigest())
-    return tokens.digest(secret, *parts).hex()[:32]
+    return course_secret.digest(secret, *parts).hex()[:32]
 
 
 def _fingerprint(exercise: Exercise) -> str:

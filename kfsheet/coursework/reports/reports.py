@@ -14,11 +14,11 @@ from textwrap import shorten
 
 from kfsheet.coursework.judging.diagnosis import RIGHT
 from kfsheet.coursework.judging.judge import CREDIT, Mark
-from kfsheet.coursework.reading.places import Places
+from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.coursework.reading.roster import harmless
 from kfsheet.coursework.reading.submission import read_submission
 from kfsheet.coursework.reports.grading import STATUSES, Handed, Result
-from kfsheet.coursework.reports.marking import colour_of, mark_workbook
+from kfsheet.coursework.reports.marked_workbook import colour_of, mark_workbook
 from kfsheet.files import write_file
 from kfsheet.model.exercise import Exercise
 
@@ -65,8 +65,8 @@ def write_reports(
 def _marked_anew(exercise: Exercise, result: Result) -> bytes:
     """The student's workbook with the marks that a lecturer has changed."""
     book = read_submission(result.path)
-    places = Places.find(book, exercise.model)
-    return mark_workbook(result.path, book, places, result.marks, result.override)
+    addresses = CellAddresses.find(book, exercise.model)
+    return mark_workbook(result.path, book, addresses, result.marks, result.override)
 
 
 def _table(head: Iterable[str], lines: Iterable[Iterable[object]]) -> str:

@@ -13,7 +13,8 @@ from pathlib import Path
 from sympy import Expr, Matrix, Piecewise, Symbol, atan2, cos, diag, pi, sin, sqrt
 
 from kfsheet.estimation.algebra import discrete_noise, transition_matrix
-from kfsheet.estimation.kalman import Observation, State, StateSpace, add_filter
+from kfsheet.estimation.kalman import add_filter
+from kfsheet.estimation.state_space import Observation, State, StateSpace
 from kfsheet.exercises.cannonball.charts import CHARTS
 from kfsheet.exercises.cannonball.words import ABOUT, QUESTIONS, SECTIONS, TASK
 from kfsheet.model.exercise import Exercise

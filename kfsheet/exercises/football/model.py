@@ -194,10 +194,22 @@ def _pixel_frame(m: Recurrence) -> None:
 
 
 def _goal_line(m: Recurrence) -> None:
+    """When and how high the ball will cross x = 0, forecast anew from every photo."""
+    names = "u_next", "w_next", "wait", "s_wait", "z_goal", "slope", "s_goal"
+    m.columns(*names, section="Goal line")
+    _crossing(m)
+    _spread_of_crossing(m)
+    wait, s_wait, z_goal, s_goal = m["wait", "s_wait", "z_goal", "s_goal"]
+    m.summary("goal_wait", Last(wait), "s", "goal line: time after the last photo")
+    m.summary("goal_wait_sigma", Last(s_wait), "s", "goal line: standard deviation of that time")
+    m.summary("goal_height", Last(z_goal), "m", "goal line: height of the ball")
+    m.summary("goal_sigma", Last(s_goal), "m", "goal line: standard deviation of the height")
+
+
+def _crossing(m: Recurrence) -> None:
+    """The time left, the height and the slope there, from the latest two analyses."""
     dt, g, u, w, x_a, z_a = m["dt", "g", "u", "w", "x_a", "z_a"]
-    u_next, w_next, wait, s_wait, z_goal, slope, s_goal = m.columns(
-        "u_next", "w_next", "wait", "s_wait", "z_goal", "slope", "s_goal", section="Goal line"
-    )
+    u_next, w_next, wait, z_goal, slope = m["u_next", "w_next", "wait", "z_goal", "slope"]
     step_x = (x_a[t] - x_a[t - 1]) / dt - _friction(m, u[t]) * dt
     step_z = (z_a[t] - z_a[t - 1]) / dt - _friction(m, w[t]) * dt - g * dt
     start_x, start_z = [m["u_0"]], [m["w_0"]]
@@ -219,6 +231,11 @@ def _goal_line(m: Recurrence) -> None:
     )
     slope_then = (w_next[t] + g * (dt / 2 - wait[t])) / u_next[t]
     m.define(slope[t], when_observed(wait[t], slope_then), "", "slope of the path at the goal line")
+
+
+def _spread_of_crossing(m: Recurrence) -> None:
+    """Standard deviations of the time left and of the height, to first order in the errors."""
+    dt, u_next, wait, s_wait, slope, s_goal = m["dt", "u_next", "wait", "s_wait", "slope", "s_goal"]
     # Error propagation: x_a and z_a of this photo and of the one before, taken as independent.
     # Their errors are in fact positively correlated, so both spreads are on the safe side.
     spread = (1 + wait[t] / dt) ** 2 + (wait[t] / dt) ** 2
@@ -235,10 +252,6 @@ def _goal_line(m: Recurrence) -> None:
         "m",
         "standard deviation of z_goal, as if analyses erred independently",
     )
-    m.summary("goal_wait", Last(wait), "s", "goal line: time after the last photo")
-    m.summary("goal_wait_sigma", Last(s_wait), "s", "goal line: standard deviation of that time")
-    m.summary("goal_height", Last(z_goal), "m", "goal line: height of the ball")
-    m.summary("goal_sigma", Last(s_goal), "m", "goal line: standard deviation of the height")
 
 
 def _check_times(camera: object, photos: Table, truth: object, flight: Table) -> None:

@@ -7,7 +7,7 @@ from sympy import Expr, Matrix, Symbol, diag
 from kfsheet.errors import ModelError
 from kfsheet.estimation.algebra import discrete_noise
 from kfsheet.estimation.drag import flight
-from kfsheet.estimation.kalman import Observation, State, StateSpace
+from kfsheet.estimation.state_space import Observation, State, StateSpace
 from kfsheet.model.expressions import t
 from kfsheet.model.recurrence import Recurrence
 

@@ -53,23 +53,46 @@ def add_centroid(m: Recurrence, section: str = "Centroid") -> None:
     A row is a pixel of an image of 10 x 10; the last row is the first pixel of an eleventh line.
     """
     m.rows_are(section, "pixel")
+    _add_light(m)
+    m.columns("i_px", "j_px", "n_right", "n_down", "n_depth", "light", "weight", section=section)
+    _add_pixels(m)
+    i_0, j_0, R, side, pitch = m["i_ball", "j_ball", "radius_px", "window", "pitch"]
+    i, j, w = m["i_px", "j_px", "weight"]
+    # Pixels that would touch the ball, but have no row, begin at the sides of the image, and on
+    # the line of the last row, which is not complete.
+    inside = And(Min(i_0, j_0) - R >= -pitch, i_0 + R <= side * pitch, j_0 + R <= Last(j))
+    words = "1: the rows hold the whole ball; 0: a part is cut off, the shift is wrong"
+    m.summary("ball_fits", Piecewise((1, inside), (0, True)), "", words)
+    for name, at, centre, words in (("i", i, i_0, "right"), ("j", j, j_0, "down")):
+        found = m.summary(
+            f"{name}_centroid", SumProduct(w, at) / Sum(w), "px", f"centre of intensity, {words}"
+        )
+        m.summary(f"shift_{name}", (found - centre) / R, "", f"its shift over the radius, {words}")
+
+
+def _add_light(m: Recurrence) -> None:
+    """Parameters of the ball, its light and the image; the shift by the report's closed form."""
     words = "pixels along a side of the image; 10 fill the rows, see ball_fits"
-    side = m.parameter("window", WINDOW, "", words, sign="positive")
-    i_0 = m.parameter("i_ball", 4.5, "px", "true centre of the ball, to the right")
-    j_0 = m.parameter("j_ball", 4.5, "px", "true centre of the ball, down")
-    R = m.parameter("radius_px", 4, "px", "radius of the ball in the image", sign="positive")
+    m.parameter("window", WINDOW, "", words, sign="positive")
+    m.parameter("i_ball", 4.5, "px", "true centre of the ball, to the right")
+    m.parameter("j_ball", 4.5, "px", "true centre of the ball, down")
+    m.parameter("radius_px", 4, "px", "radius of the ball in the image", sign="positive")
     angle = m.parameter("phi", 90, "deg", "light: 0 behind the camera, 90 from the right")
     phi = m.derived("phi_rad", angle * pi / 180, "rad", "the same in rad")
-    ambient = m.parameter("ambient", 0, "", "light from everywhere", sign="nonnegative")
-    albedo = m.parameter("albedo", 1, "", "brightness of the ball", sign="nonnegative")
-    wall = m.parameter("wall", 0, "", "brightness of the background", sign="nonnegative")
-    least = m.parameter("threshold", 0, "", "smallest difference that counts", sign="nonnegative")
-    pitch = m.parameter("pitch", 1, "px", "distance of two pixels", sign="positive")
+    m.parameter("ambient", 0, "", "light from everywhere", sign="nonnegative")
+    m.parameter("albedo", 1, "", "brightness of the ball", sign="nonnegative")
+    m.parameter("wall", 0, "", "brightness of the background", sign="nonnegative")
+    m.parameter("threshold", 0, "", "smallest difference that counts", sign="nonnegative")
+    m.parameter("pitch", 1, "px", "distance of two pixels", sign="positive")
     theory = 3 * pi / 16 * sin(phi) * (1 + cos(phi)) / ((pi - phi) * cos(phi) + sin(phi))
     m.derived("shift_theory", theory, "", "shift over radius: closed form, for ambient = wall = 0")
-    i, j, a, b, c, light, w = m.columns(
-        "i_px", "j_px", "n_right", "n_down", "n_depth", "light", "weight", section=section
-    )
+
+
+def _add_pixels(m: Recurrence) -> None:
+    """Lambert's law, pixel by pixel, and what is left once the background is taken away."""
+    side, pitch, i_0, j_0, R = m["window", "pitch", "i_ball", "j_ball", "radius_px"]
+    phi, ambient, albedo, wall, least = m["phi_rad", "ambient", "albedo", "wall", "threshold"]
+    i, j, a, b, c, light, w = m["i_px", "j_px", "n_right", "n_down", "n_depth", "light", "weight"]
     m.define(i[t], Mod(t, side) * pitch, "px", "pixel, to the right")
     m.define(j[t], floor(t / side) * pitch, "px", "pixel, down")
     m.define(a[t], (i[t] - i_0) / R, "", "normal of the ball there, to the right")
@@ -82,13 +105,3 @@ def add_centroid(m: Recurrence, section: str = "Centroid") -> None:
     difference = Abs(light[t] - wall)
     counted = Piecewise((difference, difference > least), (0, True))
     m.define(w[t], counted, "", "what is left of it after subtraction of the background")
-    # Pixels that would touch the ball, but have no row, begin at the sides of the image, and on
-    # the line of the last row, which is not complete.
-    inside = And(Min(i_0, j_0) - R >= -pitch, i_0 + R <= side * pitch, j_0 + R <= Last(j))
-    words = "1: the rows hold the whole ball; 0: a part is cut off, the shift is wrong"
-    m.summary("ball_fits", Piecewise((1, inside), (0, True)), "", words)
-    for name, at, centre, words in (("i", i, i_0, "right"), ("j", j, j_0, "down")):
-        found = m.summary(
-            f"{name}_centroid", SumProduct(w, at) / Sum(w), "px", f"centre of intensity, {words}"
-        )
-        m.summary(f"shift_{name}", (found - centre) / R, "", f"its shift over the radius, {words}")

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 
 from sympy import Piecewise, Symbol, diag, sqrt, zeros
 
-from kfsheet.estimation.kalman import Intermediate, Observation, State, StateSpace, add_filter
+from kfsheet.estimation.kalman import add_filter
+from kfsheet.estimation.state_space import Intermediate, Observation, State, StateSpace
 from kfsheet.exercises.tennis.calculators import add_cameras, add_centroid
 from kfsheet.exercises.tennis.charts import CHARTS
 from kfsheet.exercises.tennis.methods.cameras import FOCAL_LENGTH, PIXELS

@@ -30,41 +30,10 @@ def add_triangulation(m: Recurrence) -> None:
         s1 = (a22 b1 - a12 b2) / (a11 a22 - a12^2),   a_jk = r_j.r_k,   b_j = r_j.(c2 - c1)
         s2 = (a12 b1 - a11 b2) / (a11 a22 - a12^2)
     """
-    page, f, u_c = "Triangulation", *m["f_px", "u_c"]
-    slopes = m.columns("p1", "q1", "p2", "q2", section=page)
-    ways = {"u1": -1, "v1": -1, "u2": 1, "v2": -1}  # right is -x2 for camera 1, +x1 for camera 2
-    for slope, (name, way) in zip(slopes, ways.items(), strict=True):
-        seen, words = m[name][t], f"slope of the line of sight, from {name}"
-        m.define(slope[t], when_observed(seen, way * (seen - u_c) / f), "", words)
-    p1, q1, p2, q2 = (slope[t] for slope in slopes)
-    one, two = Matrix([1, p1, q1]), Matrix([p2, 1, q2])
-    c1, c2 = (Matrix(m[f"c{k}_x", f"c{k}_y", f"c{k}_z"]) for k in (1, 2))
-    both = (p1, q1, p2, q2)
-    products = {
-        "a11": (one.dot(one), "", "line 1 times itself"),
-        "a12": (one.dot(two), "", "line 1 times line 2"),
-        "a22": (two.dot(two), "", "line 2 times itself"),
-        "b1": (one.dot(c2 - c1), "m", "line 1 times the way from camera 1 to camera 2"),
-        "b2": (two.dot(c2 - c1), "m", "line 2 times that way"),
-    }
-    a11, a12, a22, b1, b2 = (column[t] for column in m.columns(*products, section=page))
-    for name, (rule, unit, words) in products.items():
-        m.define(m[name][t], when_observed(both, rule), unit, words)
-    det, s1, s2 = m.columns("a_det", "s1", "s2", section=page)
-    squares = when_observed((a11, a12, a22), a11 * a22 - a12**2)
-    m.define(det[t], squares, "", "determinant: 0 if the lines are parallel")
-    first = when_observed((a12, a22, b1, b2, det[t]), (a22 * b1 - a12 * b2) / det[t])
-    m.define(s1[t], first, "m", "how far along line 1 the closest point is")
-    second = when_observed((a11, a12, b1, b2, det[t]), (a12 * b1 - a11 * b2) / det[t])
-    m.define(s2[t], second, "m", "the same for line 2")
-    ends = {}
-    for k, corner, line, s in ((1, c1, one, s1), (2, c2, two, s2)):
-        for n in AXES:
-            (end,) = m.columns(f"y{k}_{n}", section=page)
-            asked = tuple(cell for cell in (s[t], line[n - 1]) if cell.args)
-            rule, words = corner[n - 1] + s[t] * line[n - 1], f"closest point of line {k}"
-            m.define(end[t], when_observed(asked, rule), "m", f"{words}, x{n}")
-            ends[k, n] = end[t]
+    page = "Triangulation"
+    lines = _lines_of_sight(m, page)
+    _how_far(m, page, lines)
+    ends = _closest_points(m, page, lines)
     for n, words in AXES.items():
         (x,) = m.columns(f"x{n}_tri", section=page)
         pair = (ends[1, n], ends[2, n])
@@ -77,6 +46,63 @@ def add_triangulation(m: Recurrence) -> None:
     between = [column[t] for column in apart]
     m.define(gap[t], when_observed(tuple(between), length(between)), "m", "between the lines")
     m.summary("rms_gap", RMS(gap), "m", "root mean square of the gap")
+
+
+def _lines_of_sight(m: Recurrence, page: str) -> dict[int, Matrix]:
+    """Directions r1 = (1, p1, q1) and r2 = (p2, 1, q2), from the pixels."""
+    f, u_c = m["f_px", "u_c"]
+    slopes = m.columns("p1", "q1", "p2", "q2", section=page)
+    ways = {"u1": -1, "v1": -1, "u2": 1, "v2": -1}  # right is -x2 for camera 1, +x1 for camera 2
+    for slope, (name, way) in zip(slopes, ways.items(), strict=True):
+        seen, words = m[name][t], f"slope of the line of sight, from {name}"
+        m.define(slope[t], when_observed(seen, way * (seen - u_c) / f), "", words)
+    p1, q1, p2, q2 = (slope[t] for slope in slopes)
+    return {1: Matrix([1, p1, q1]), 2: Matrix([p2, 1, q2])}
+
+
+def _camera(m: Recurrence, k: int) -> Matrix:
+    """Where camera k stands."""
+    return Matrix(m[f"c{k}_x", f"c{k}_y", f"c{k}_z"])
+
+
+def _how_far(m: Recurrence, page: str, lines: dict[int, Matrix]) -> None:
+    """The lengths s1 and s2 along the lines, and the products that they are made of."""
+    one, two, way = lines[1], lines[2], _camera(m, 2) - _camera(m, 1)
+    both = (one[1], one[2], two[0], two[2])
+    products = {
+        "a11": (one.dot(one), "", "line 1 times itself"),
+        "a12": (one.dot(two), "", "line 1 times line 2"),
+        "a22": (two.dot(two), "", "line 2 times itself"),
+        "b1": (one.dot(way), "m", "line 1 times the way from camera 1 to camera 2"),
+        "b2": (two.dot(way), "m", "line 2 times that way"),
+    }
+    a11, a12, a22, b1, b2 = (column[t] for column in m.columns(*products, section=page))
+    for name, (rule, unit, words) in products.items():
+        m.define(m[name][t], when_observed(both, rule), unit, words)
+    det, s1, s2 = m.columns("a_det", "s1", "s2", section=page)
+    squares = when_observed((a11, a12, a22), a11 * a22 - a12**2)
+    m.define(det[t], squares, "", "determinant: 0 if the lines are parallel")
+    first = when_observed((a12, a22, b1, b2, det[t]), (a22 * b1 - a12 * b2) / det[t])
+    m.define(s1[t], first, "m", "how far along line 1 the closest point is")
+    second = when_observed((a11, a12, b1, b2, det[t]), (a12 * b1 - a11 * b2) / det[t])
+    m.define(s2[t], second, "m", "the same for line 2")
+
+
+def _closest_points(
+    m: Recurrence, page: str, lines: dict[int, Matrix]
+) -> dict[tuple[int, int], Expr]:
+    """Cells of c_k + s_k r_k, by line and axis."""
+    ends = {}
+    for k, line in lines.items():
+        s = m[f"s{k}"][t]
+        for n, corner in zip(AXES, _camera(m, k), strict=True):
+            (end,) = m.columns(f"y{k}_{n}", section=page)
+            # One component of each direction is 1 and has no cell that could be missing.
+            asked = tuple(cell for cell in (s, line[n - 1]) if cell.args)
+            rule, words = corner + s * line[n - 1], f"closest point of line {k}"
+            m.define(end[t], when_observed(asked, rule), "m", f"{words}, x{n}")
+            ends[k, n] = end[t]
+    return ends
 
 
 def add_start(m: Recurrence) -> None:

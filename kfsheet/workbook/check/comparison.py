@@ -27,18 +27,18 @@ from kfsheet.model.expressions import lag, t
 from kfsheet.model.validation import walk
 from kfsheet.parsing.references import Address
 from kfsheet.printing.python import python_code
-from kfsheet.workbook.check.opened import Opened
-from kfsheet.workbook.check.whole import Whole
-from kfsheet.workbook.engines.ironcalc import Values
-from kfsheet.workbook.write.check_sheet import check_page
-from kfsheet.workbook.write.contents import (
+from kfsheet.workbook.check.column_comparison import ColumnComparison
+from kfsheet.workbook.check.opened_workbook import OpenedWorkbook
+from kfsheet.workbook.engines.spreadsheet_engine import Values
+from kfsheet.workbook.write.check_sheet import check_sheet
+from kfsheet.workbook.write.exercise_sheets import (
     Run,
-    charts_page,
-    parameters_page,
-    section_page,
+    charts_sheet,
+    parameters_sheet,
+    section_sheet,
 )
 from kfsheet.workbook.write.layout import FIRST_ROW, Layout
-from kfsheet.workbook.write.page import Page, Piece, is_formula
+from kfsheet.workbook.write.sheet import Cell, Sheet, is_formula
 
 TOLERANCES = {"ironcalc": 1e-12, "libreoffice": 1e-11}
 
@@ -50,27 +50,27 @@ class Comparison:
     """
 
     def __init__(
-        self, book: Opened, layout: Layout, exercise: Exercise, now: Run, built: Run
+        self, book: OpenedWorkbook, layout: Layout, exercise: Exercise, now: Run, built: Run
     ) -> None:
         self.book, self.layout = book, layout
         self.tolerance = TOLERANCES[book.engine_name]
         self.pages = [*self._pages(exercise, now, built)]
         self.values: Values = {}
         self.cells, self.largest = 0, 0.0
-        self._wholes: dict[tuple[str, int], Whole | None] = {}
-        self.differing: dict[Address, Piece] = {}
+        self._wholes: dict[tuple[str, int], ColumnComparison | None] = {}
+        self.differing: dict[Address, Cell] = {}
         self.problems: dict[Address, str] = {}
 
     def run(self, values: Values) -> None:
         """Compare every formula cell, then look for the culprits among those that differ."""
         self.values = values
         for page in self.pages:
-            for (row, column), piece in page.pieces.items():
+            for (row, column), piece in page.cells.items():
                 self._compare((page.title, row, column), piece)
             for column, filled in page.columns.items():
                 if not self._whole(page, column):
                     for row in filled.rows:
-                        self._compare((page.title, row, column), filled.piece(row))
+                        self._compare((page.title, row, column), filled.cell(row))
         homes = self._homes() if self.differing else {}
         blind = []
         for address, piece in self.differing.items():
@@ -84,13 +84,13 @@ class Comparison:
             if self._text(address) != _plain(piece.content) or not self.problems:
                 self.problems[address] = self._words(piece.stored, address)
 
-    def _pages(self, exercise: Exercise, now: Run, built: Run) -> Iterator[Page]:
+    def _pages(self, exercise: Exercise, now: Run, built: Run) -> Iterator[Sheet]:
         """The worksheets that hold formulas."""
-        yield parameters_page(self.layout, now)
+        yield parameters_sheet(self.layout, now)
         for section in self.layout.model.sections:
-            yield section_page(self.layout, section, now)
-        yield charts_page(exercise, self.layout, now)
-        yield check_page(self.layout, now, built)
+            yield section_sheet(self.layout, section, now)
+        yield charts_sheet(exercise, self.layout, now)
+        yield check_sheet(self.layout, now, built)
 
     def prepare(self) -> None:
         """Find what is needed to compare whole columns, before the engine has answered."""
@@ -98,7 +98,7 @@ class Comparison:
             for column in page.columns:
                 self._wanted(page, column)
 
-    def _wanted(self, page: Page, at: int) -> Whole | None:
+    def _wanted(self, page: Sheet, at: int) -> ColumnComparison | None:
         """What is expected of a column; None if its formulas are not where they belong."""
         key = page.title, at
         if key not in self._wholes:
@@ -106,10 +106,10 @@ class Comparison:
             hollow = {filled.first + n for n, rule in enumerate(filled.rules) if rule is None}
             formulas = self.book.formulas_among(filled.rows, page.title, at)
             there = not filled.rules or formulas == set(filled.rows) - hollow
-            self._wholes[key] = Whole(filled, at, self.tolerance) if there else None
+            self._wholes[key] = ColumnComparison(filled, at, self.tolerance) if there else None
         return self._wholes[key]
 
-    def _whole(self, page: Page, at: int) -> bool:
+    def _whole(self, page: Sheet, at: int) -> bool:
         """Whether a column agrees as a whole, so that none of its cells needs words."""
         wanted = self._wanted(page, at)
         far = wanted.distance(self.values.get(page.title, {})) if wanted else None
@@ -119,7 +119,7 @@ class Comparison:
         self.largest = max(self.largest, far)
         return True
 
-    def _compare(self, address: Address, piece: Piece) -> None:
+    def _compare(self, address: Address, piece: Cell) -> None:
         formula, value = self.book.is_formula(address), self.book.value(address)
         if is_formula(piece.content):
             self.cells += 1
@@ -170,7 +170,7 @@ class Comparison:
             homes[layout.scalars[name]] = (scalar.expression, 0)
         return homes
 
-    def _judge(self, address: Address, piece: Piece, rule: Expr, row: int) -> None:
+    def _judge(self, address: Address, piece: Cell, rule: Expr, row: int) -> None:
         """Compute one cell from the engine's values of its inputs; if it differs, it is wrong."""
         inputs = list(self._inputs(address, rule, row))
         if any(cell in self.problems and cell[2] == self._step(cell[0]) for cell in inputs):

@@ -18,11 +18,11 @@ from kfsheet.errors import DataError
 from kfsheet.model.exercise import Exercise
 from kfsheet.parsing.references import Address
 from kfsheet.workbook.check.comparison import Comparison
-from kfsheet.workbook.check.opened import Inputs, Opened
-from kfsheet.workbook.engines.copies import Changes
+from kfsheet.workbook.check.opened_workbook import Inputs, OpenedWorkbook
+from kfsheet.workbook.engines.spreadsheet_engine import Changes
 from kfsheet.workbook.write.check_sheet import FIGURES
-from kfsheet.workbook.write.contents import Run
 from kfsheet.workbook.write.layout import Layout
+from kfsheet.workbook.write.run import Run
 
 NUDGE = 0.01
 GOLDEN = (math.sqrt(5) - 1) / 2
@@ -36,7 +36,7 @@ class Trial:
 
     words: str
     changes: Changes
-    book: Opened
+    book: OpenedWorkbook
     exercise: Exercise
     layout: Layout
     run: Run
@@ -50,7 +50,7 @@ class Trial:
 
 
 def trials_of(
-    book: Opened, exercise: Exercise, inputs: Inputs, now: Run, built: Run
+    book: OpenedWorkbook, exercise: Exercise, inputs: Inputs, now: Run, built: Run
 ) -> Iterator[Trial]:
     """The trials of a workbook that holds some inputs, whose run is ``now``."""
     yield Trial("", {}, book, exercise, inputs.layout, now, built)
@@ -62,7 +62,7 @@ def trials_of(
         yield Trial(words, changes, book, exercise, inputs.layout, run, built)
 
 
-def compared(book: Opened, trials: Iterator[Trial]) -> Iterator[Trial]:
+def compared(book: OpenedWorkbook, trials: Iterator[Trial]) -> Iterator[Trial]:
     """Trials beside what the engine finds; while one is compared, it calculates the next."""
     trial = next(trials)
     while trial:
@@ -84,7 +84,7 @@ class Foreseen:
     trials: Iterator[Trial]
 
 
-def foreseen(book: Opened, exercise: Exercise) -> Foreseen:
+def foreseen(book: OpenedWorkbook, exercise: Exercise) -> Foreseen:
     """What can be found before the engine has answered; it is told what may be asked next."""
     run, layout = Run.of(exercise.model), Layout.standard(exercise.model)
     inputs = Inputs.of(layout, run)

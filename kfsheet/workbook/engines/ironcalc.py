@@ -1,4 +1,4 @@
-"""IronCalc, the spreadsheet engine that comes with kfsheet."""
+"""IronCalc, the spreadsheet engine of the extra ``check``, in this process."""
 
 from __future__ import annotations
 
@@ -8,23 +8,20 @@ from contextlib import contextmanager
 from itertools import groupby, starmap
 from operator import itemgetter
 from pathlib import Path
+from types import ModuleType
 
 from kfsheet.errors import EngineError
-from kfsheet.workbook.engines.copies import Changes, copy_for_ironcalc
+from kfsheet.workbook.engines.copies_for_engines import copy_for_ironcalc
+from kfsheet.workbook.engines.spreadsheet_engine import CellValue, Changes, Values
 
-CellValue = float | int | str | bool | None
 Place = tuple[int, int, int]
 """Number of the sheet, counted from 0, row and column, counted from 1."""
 Cells = dict[str, list[tuple[int, int]]]
 """Row and column, counted from 1, of the cells of each sheet."""
-SheetValues = dict[tuple[int, int], CellValue]
-"""Value by row and column, counted from 1; errors are strings such as '#DIV/0!'."""
-Values = dict[str, SheetValues]
-"""Values by the sheet's title."""
 
 
 @contextmanager
-def _words(words: str) -> Iterator[None]:
+def _one_line(words: str) -> Iterator[None]:
     """What IronCalc raises, in one line; a panic of Rust is no Exception to Python."""
     try:
         yield
@@ -35,24 +32,36 @@ def _words(words: str) -> Iterator[None]:
         raise EngineError(f"{words}: {first}") from None
 
 
+def _ironcalc() -> ModuleType:
+    try:
+        import ironcalc
+    except ImportError:
+        raise EngineError(
+            'IronCalc is not installed; pip install "kfsheet[check]", or use --engine libreoffice'
+        ) from None
+    return ironcalc
+
+
 class IronCalc:
     """A workbook in IronCalc: loaded once, calculated as often as inputs change."""
 
     def __init__(self, path: Path, folder: str | None = None) -> None:
         """``folder`` is where a copy of the file may lie for a moment."""
-        import ironcalc
-
+        ironcalc = _ironcalc()
         self._path = path
         with tempfile.TemporaryDirectory(prefix="kfsheet-", dir=folder) as own:
             copy = Path(own) / "copy.xlsx"
             copy_for_ironcalc(path, copy)
-            with _words(f"IronCalc cannot read {path}"):
+            with _one_line(f"IronCalc cannot read {path}"):
                 self._model = ironcalc.load_from_xlsx(str(copy), "en", "UTC")
         self._titles = [sheet["name"] for sheet in self._model.get_worksheets_properties()]
         self._before: dict[Place, CellValue] = {}
         self._places: list[Place] = []
         self._sorted: list[Place] = []
         self._cells: Cells = {}
+
+    def ask(self, changes: Changes | None = None) -> None:
+        """Nothing begins here: this process has something else to do."""
 
     def values(self, changes: Changes | None = None) -> Values:
         """Values of all cells that are not empty, with numbers put in first."""
@@ -62,13 +71,13 @@ class IronCalc:
         """All cells, and the values of one after the other, with numbers put in first."""
         if unknown := [sheet for sheet in changes or {} if sheet not in self._titles]:
             raise EngineError(f"{self._path} has no worksheet {unknown[0]!r} to put numbers in")
-        with _words(f"IronCalc cannot put numbers into {self._path}"):
+        with _one_line(f"IronCalc cannot put numbers into {self._path}"):
             self._restore()
             for sheet, cells in (changes or {}).items():
                 number = self._titles.index(sheet)
                 for (row, column), value in cells.items():
                     self._put(number, row, column, value)
-        with _words(f"IronCalc cannot calculate {self._path}"):
+        with _one_line(f"IronCalc cannot calculate {self._path}"):
             self._model.evaluate()
         cells = self.cells()
         return cells, list(starmap(self._model.get_cell_value, self._sorted))

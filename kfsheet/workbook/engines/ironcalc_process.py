@@ -31,14 +31,13 @@ from typing import BinaryIO
 
 from kfsheet.errors import EngineError, KfsheetError, WorkbookError
 from kfsheet.processes import answers, command, kill
-from kfsheet.workbook.engines.copies import Changes
-from kfsheet.workbook.engines.ironcalc import Cells, IronCalc, Values, by_address
+from kfsheet.workbook.engines.ironcalc import Cells, IronCalc, by_address
+from kfsheet.workbook.engines.spreadsheet_engine import TIMEOUT, Changes, Values
 
-TIMEOUT = 300  # seconds that an answer may take
 VALUES = "values"  # the kind of an answer that is none of the errors
 
 
-class Apart:
+class IronCalcProcess:
     """A workbook in IronCalc, apart. What will be wanted can be asked for before it is wanted.
 
     It is for one thread.
@@ -55,7 +54,7 @@ class Apart:
             start_new_session=True,
         )
         weakref.finalize(self, _end, self._process, folder)
-        self._desk = _Desk(Path(folder))
+        self._shared = _SharedFolder(Path(folder))
         self._numbers = count(1)
         self._asked: dict[bytes, int] = {}
         """Numbers of the questions that are not yet answered, by what they ask."""
@@ -70,10 +69,10 @@ class Apart:
         question = _question(changes)
         if question not in self._asked:
             number = next(self._numbers)
-            self._desk.put(f"question {number}", question)
+            self._shared.put(f"question {number}", question)
             self._asked[question] = number
             with suppress(OSError):  # it has ended; the answer will say so
-                _tell(self._process.stdin, number)
+                _send(self._process.stdin, number)
         return self._asked[question]
 
     def values(self, changes: Changes | None = None) -> Values:
@@ -82,7 +81,7 @@ class Apart:
         while self._answered < number:
             self._answered = self._next()
         self._asked = {question: n for question, n in self._asked.items() if n > number}
-        kind, *found = marshal.loads(self._desk.take(f"answer {number}"))
+        kind, *found = marshal.loads(self._shared.take(f"answer {number}"))
         if kind != VALUES:
             raise {"WorkbookError": WorkbookError}.get(kind, EngineError)(*found)
         cells, values = found
@@ -105,7 +104,7 @@ class Apart:
 
     @cached_property
     def _cells(self) -> Cells:
-        return marshal.loads(self._desk.take("cells"))
+        return marshal.loads(self._shared.take("cells"))
 
 
 def _question(changes: Changes | None) -> bytes:
@@ -117,7 +116,7 @@ def _question(changes: Changes | None) -> bytes:
     return marshal.dumps(plain, 2)  # later versions write shared objects as they happen to be
 
 
-class _Desk:
+class _SharedFolder:
     """A folder in which one process puts what another one takes."""
 
     def __init__(self, folder: Path) -> None:
@@ -130,7 +129,7 @@ class _Desk:
         return (self.folder / name).read_bytes()
 
 
-def _tell(pipe: BinaryIO, number: int) -> None:
+def _send(pipe: BinaryIO, number: int) -> None:
     pipe.write(b"%d\n" % number)
     pipe.flush()
 
@@ -147,19 +146,19 @@ def _end(process: subprocess.Popen, folder: str) -> None:
 def main(path: str, folder: str) -> None:
     """Answer what standard input asks, until it ends; then the folder is of use to nobody."""
     gc.disable()  # nothing here is circular, and a search would copy the memory that forks share
-    service = _Service(Path(path), _Desk(Path(folder)))
+    server = _Server(Path(path), _SharedFolder(Path(folder)))
     try:
-        service.serve()
+        server.serve()
     finally:
-        service.end()  # but whoever asked may still look into the folder
+        server.end()  # but whoever asked may still look into the folder
         shutil.rmtree(folder, ignore_errors=True)
 
 
-class _Service:
+class _Server:
     """A workbook that is loaded when it is first asked about, and the forks that calculate it."""
 
-    def __init__(self, path: Path, desk: _Desk) -> None:
-        self._path, self._desk = path, desk
+    def __init__(self, path: Path, shared: _SharedFolder) -> None:
+        self._path, self._shared = path, shared
         # Without a buffer, in which a question could hide from select.
         self._source, self._pipe = FileIO(0), answers()
         self._engine: IronCalc | None = None
@@ -169,18 +168,18 @@ class _Service:
     def serve(self) -> None:
         """Answer questions until there are no more, or a fork has died."""
         for number in self._questions():
-            changes = marshal.loads(self._desk.take(f"question {number}"))
+            changes = marshal.loads(self._shared.take(f"question {number}"))
             try:
                 self._load()
             except KfsheetError as error:
                 self._refuse(number, error)
-                _tell(self._pipe, number)
+                _send(self._pipe, number)
                 continue
             if not self._fork(number, changes):
                 while self._forks:
-                    self._tell_of_a_fork()
+                    self._send_of_a_fork()
                 self._answer(number, changes)
-                _tell(self._pipe, number)
+                _send(self._pipe, number)
 
     def _fork(self, number: int, changes: Changes) -> bool:
         """Whether a fork calculates it: there are none on Windows, or no more of them."""
@@ -206,22 +205,22 @@ class _Service:
             while True:
                 ends = [fork.end for fork in self._forks]
                 if ends and self._source not in select([self._source, ends[0]], [], [])[0]:
-                    self._tell_of_a_fork()
+                    self._send_of_a_fork()
                 elif line := self._source.readline():
                     yield int(line)
                 else:
                     return
 
-    def _tell_of_a_fork(self) -> None:
+    def _send_of_a_fork(self) -> None:
         fork = self._forks.popleft()
         fork.wait()
-        _tell(self._pipe, fork.number)
+        _send(self._pipe, fork.number)
 
     def _load(self) -> None:
         if self._engine is None:
-            self._engine = IronCalc(self._path, str(self._desk.folder))
+            self._engine = IronCalc(self._path, str(self._shared.folder))
             self._cells = self._engine.cells()
-            self._desk.put("cells", marshal.dumps(self._cells))
+            self._shared.put("cells", marshal.dumps(self._cells))
 
     def _answer(self, number: int, changes: Changes) -> None:
         """Calculate; of the cells only those are told that are others than at first."""
@@ -236,7 +235,7 @@ class _Service:
         self._put(number, (type(error).__name__, str(error)))
 
     def _put(self, number: int, answer: tuple) -> None:
-        self._desk.put(f"answer {number}", marshal.dumps(answer))
+        self._shared.put(f"answer {number}", marshal.dumps(answer))
 
 
 class _Fork:

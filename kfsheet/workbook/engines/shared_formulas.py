@@ -25,13 +25,13 @@ UNSURE = re.compile(
 FIRST = 1_000_000_000  # number of a group; those that are in a file count from 0
 
 
-def shared(xml: bytes) -> bytes:
+def share_formulas(xml: bytes) -> bytes:
     r"""A worksheet in which formulas that are filled down are shared.
 
     IronCalc does not ask how far a group reaches; the file is for no other program.
 
     >>> column = b'<c r="B1"><f>A!C1+$D$1</f></c> <c r="B2"><f>A!C2+$D$1</f></c>'
-    >>> print(shared(column).decode().replace("> <", ">\n<"))
+    >>> print(share_formulas(column).decode().replace("> <", ">\n<"))
     <c r="B1"><f t="shared" ref="B1" si="1000000000">A!C1+$D$1</f></c>
     <c r="B2"><f t="shared" si="1000000000"/></c>
     """

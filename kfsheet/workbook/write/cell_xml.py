@@ -2,7 +2,7 @@
 
 openpyxl makes an object and an XML element of every cell, which is most of the time that a large
 workbook takes. What is around the cells (styles, names, charts, widths) is left to it; the cells
-are put into its file by :func:`kfsheet.workbook.write.finish.finish`.
+are put into its file by :func:`kfsheet.workbook.write.reproducible_zip.finish`.
 
 A formula that is filled down is written once and shared by the cells below, as Excel writes it:
 a program that opens the file reads one formula, not a thousand. (As in Excel, a formula that refers
@@ -19,30 +19,30 @@ from xml.sax.saxutils import escape
 from openpyxl.formula.translate import Translator
 from openpyxl.utils import get_column_letter
 
-from kfsheet.workbook.write.page import Filled, Formula, Page, Piece, is_formula
+from kfsheet.workbook.write.sheet import Cell, FilledColumn, Formula, Sheet, is_formula
 
 StyleOf = Callable[[str, str, str], int]
 """Number of a style, by kind, number format and alignment."""
 
 
-def sheet_data(page: Page, style_of: StyleOf) -> str:
-    """The element ``sheetData`` of a page, stored values with the formulas."""
-    single: dict[int, dict[int, Piece]] = {}
-    for (row, column), piece in page.pieces.items():
-        single.setdefault(row, {})[column] = piece
+def sheet_data(sheet: Sheet, style_of: StyleOf) -> str:
+    """The element ``sheetData`` of a sheet, stored values with the formulas."""
+    single: dict[int, dict[int, Cell]] = {}
+    for (row, column), cell in sheet.cells.items():
+        single.setdefault(row, {})[column] = cell
     numbers = count()
     columns = [
-        (at, _Column(page, at, filled, style_of(filled.kind, filled.format, ""), numbers))
-        for at, filled in sorted(page.columns.items())
+        (at, _Column(sheet, at, filled, style_of(filled.kind, filled.format, ""), numbers))
+        for at, filled in sorted(sheet.columns.items())
     ]
-    rows = {row for filled in page.columns.values() for row in filled.rows}
+    rows = {row for filled in sheet.columns.values() for row in filled.rows}
     parts = ["<sheetData>"]
-    for row in sorted({*rows, *single, *page.heights}):
-        height = page.heights.get(row)
+    for row in sorted({*rows, *single, *sheet.heights}):
+        height = sheet.heights.get(row)
         tall = f' ht="{height:g}" customHeight="1"' if height else ""
         own = single.get(row, {})
         cells = {at: c.cell(row) for at, c in columns if row in c.rows and at not in own}
-        cells |= {at: _cell(row, at, piece, style_of) for at, piece in own.items()}
+        cells |= {at: _cell(row, at, cell, style_of) for at, cell in own.items()}
         inside = "".join(cells[at] for at in sorted(cells))
         parts.append(f'<row r="{row}"{tall}>{inside}</row>')
     parts.append("</sheetData>")
@@ -53,7 +53,7 @@ class _Column:
     """Writes the cells of a column that is filled down."""
 
     def __init__(
-        self, page: Page, at: int, filled: Filled, style: int, numbers: Iterator[int]
+        self, sheet: Sheet, at: int, filled: FilledColumn, style: int, numbers: Iterator[int]
     ) -> None:
         self.rows, self._filled, self._letter = filled.rows, filled, _letter(at)
         self._style = style
@@ -63,7 +63,7 @@ class _Column:
         for number, rule in enumerate(filled.rules):
             last = filled.rows[-1] if number == len(filled.rules) - 1 else filled.first + number
             rows = range(filled.first + number, last + 1)
-            rows = [row for row in rows if (row, at) not in page.pieces]
+            rows = [row for row in rows if (row, at) not in sheet.cells]
             if rule and len(rows) > 1 and _moves(rule, self._letter, *rows[:2]):
                 si = next(numbers)
                 area = f"{self._letter}{rows[0]}:{self._letter}{rows[-1]}"
@@ -74,9 +74,9 @@ class _Column:
     def cell(self, row: int) -> str:
         """One cell."""
         filled = self._filled
-        number = filled.number(row)
+        number = filled.rule_number(row)
         if not filled.rules or filled.rules[number] is None:
-            return _plain(f"{self._letter}{row}", self._style, filled.piece(row).content)
+            return _plain(f"{self._letter}{row}", self._style, filled.cell(row).content)
         formula = self._heads.get(row) or self._shared.get(number)
         kind, value = typed(filled.stored(row))
         formula = formula or f"<f>{escape(filled.rules[number](row)[1:])}</f>"
@@ -94,14 +94,12 @@ def _moves(rule: Formula, letter: str, row: int, other: int) -> bool:
     return Translator(text, f"{letter}{row}").translate_formula(f"{letter}{other}") == rule(other)
 
 
-def _cell(row: int, column: int, piece: Piece, style_of: StyleOf) -> str:
-    address, style = f"{_letter(column)}{row}", style_of(piece.kind, piece.format, piece.align)
-    if not is_formula(piece.content):
-        return _plain(address, style, piece.content)
-    kind, value = typed(piece.stored)
-    return (
-        f'<c r="{address}" s="{style}"{kind}><f>{escape(piece.content[1:])}</f><v>{value}</v></c>'
-    )
+def _cell(row: int, column: int, cell: Cell, style_of: StyleOf) -> str:
+    address, style = f"{_letter(column)}{row}", style_of(cell.kind, cell.format, cell.align)
+    if not is_formula(cell.content):
+        return _plain(address, style, cell.content)
+    kind, value = typed(cell.stored)
+    return f'<c r="{address}" s="{style}"{kind}><f>{escape(cell.content[1:])}</f><v>{value}</v></c>'
 
 
 def _plain(address: str, style: int, content: float | int | str | None) -> str:

@@ -13,9 +13,9 @@ from math import isfinite, isnan, nan
 
 from kfsheet.evaluation.numerics import last, mean, rms, total
 from kfsheet.model.quantities import Column
-from kfsheet.workbook.write.contents import Run
 from kfsheet.workbook.write.layout import Layout
-from kfsheet.workbook.write.page import Page, stored
+from kfsheet.workbook.write.run import Run
+from kfsheet.workbook.write.sheet import Sheet, stored_value
 from kfsheet.workbook.write.styles import number_format
 
 TOLERANCE = 1e-9
@@ -110,36 +110,36 @@ def _scale(value: float) -> float:
     return abs(value) if value and not isnan(value) else 1.0
 
 
-def check_page(layout: Layout, now: Run, built: Run) -> Page:
+def check_sheet(layout: Layout, now: Run, built: Run) -> Sheet:
     """Compose the worksheet."""
-    page = Page("Check", widths={1: 22, 2: 12, 3: 26, 4: 22, 5: 22, 6: 16, 7: 14})
-    page.freeze = f"A{TABLE_ROW + 1}"
-    page.put(1, 1, "Does this program compute what kfsheet computed?", "title")
-    page.put(2, 1, LIVE_OR_NOT)
+    sheet = Sheet("Check", widths={1: 22, 2: 12, 3: 26, 4: 22, 5: 22, 6: 16, 7: 14})
+    sheet.freeze = f"A{TABLE_ROW + 1}"
+    sheet.put(1, 1, "Does this program compute what kfsheet computed?", "title")
+    sheet.put(2, 1, LIVE_OR_NOT)
     heads = ("name", "kind", "figure", "now", "at build", "scale", "difference")
     for n, word in enumerate(heads, 1):
-        page.put(TABLE_ROW, n, word, "header", align="center")
+        sheet.put(TABLE_ROW, n, word, "header", align="center")
     lines = probes(layout, now, built)
     for row, probe in enumerate(lines, TABLE_ROW + 1):
-        _put_probe(page, row, probe)
-    _put_verdict(page, lines)
-    return page
+        _put_probe(sheet, row, probe)
+    _put_verdict(sheet, lines)
+    return sheet
 
 
-def _put_probe(page: Page, row: int, probe: Probe) -> None:
+def _put_probe(sheet: Sheet, row: int, probe: Probe) -> None:
     shape = number_format([probe.built])
     for n, word in enumerate((probe.name, probe.what, probe.quantity), 1):
-        page.put(row, n, word, "index")
-    now = stored(probe.now)
-    page.put(row, 4, probe.formula, "formula", stored=now, format=shape, scale=probe.scale)
-    page.put(row, 5, probe.built, "data", format=shape)
-    page.put(row, 6, probe.scale, "data", format=shape)
+        sheet.put(row, n, word, "index")
+    now = stored_value(probe.now)
+    sheet.put(row, 4, probe.formula, "formula", stored=now, format=shape, scale=probe.scale)
+    sheet.put(row, 5, probe.built, "data", format=shape)
+    sheet.put(row, 6, probe.scale, "data", format=shape)
     text = f"=ABS(D{row}-E{row})/F{row}"
-    far = stored(probe.difference)
-    page.put(row, 7, text, "formula", stored=far, format="0.0E+00", scale=1.0)
+    far = stored_value(probe.difference)
+    sheet.put(row, 7, text, "formula", stored=far, format="0.0E+00", scale=1.0)
 
 
-def _put_verdict(page: Page, lines: list[Probe]) -> None:
+def _put_verdict(sheet: Sheet, lines: list[Probe]) -> None:
     cells, first = {}, TABLE_ROW + 1
     for kind in KINDS:
         last_row = first + sum(p.what == kind for p in lines) - 1
@@ -151,17 +151,17 @@ def _put_verdict(page: Page, lines: list[Probe]) -> None:
     }
     figures = [
         ("verdict", verdict_formula(), verdict(changed, largest)),
-        ("largest relative difference", f"=MAX({cells['result']})", stored(largest)),
+        ("largest relative difference", f"=MAX({cells['result']})", stored_value(largest)),
         ("tolerance", TOLERANCE, None),
         ("parameters changed", _beyond(cells["parameter"]), changed["parameter"]),
         ("data figures changed", _beyond(cells["data"]), changed["data"]),
     ]
     for row, (name, content, value) in enumerate(figures, 4):
-        page.put(row, 1, name, "index")
+        sheet.put(row, 1, name, "index")
         kind = "formula" if isinstance(content, str) else "data"
         shape = "0.0E+00" if row in (5, 6) else "0"
-        page.put(row, 2, content, kind, stored=value, format=shape, scale=1.0)
-    page.names["kfsheet_verdict"] = (4, 2)
+        sheet.put(row, 2, content, kind, stored=value, format=shape, scale=1.0)
+    sheet.names["kfsheet_verdict"] = (4, 2)
 
 
 def _largest(differences: list[float]) -> float:

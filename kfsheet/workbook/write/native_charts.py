@@ -20,7 +20,7 @@ from openpyxl.workbook import Workbook
 
 from kfsheet.model.chart import LOOKS, Chart, Look, Series
 from kfsheet.model.exercise import Exercise
-from kfsheet.workbook.write.contents import chart_range
+from kfsheet.workbook.write.exercise_sheets import chart_range
 from kfsheet.workbook.write.layout import (
     CHART_COLUMNS,
     FIRST_CHART_ROW,

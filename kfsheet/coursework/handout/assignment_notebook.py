@@ -1,0 +1,153 @@
+"""The questions of an exercise as a notebook that nbgrader can hand out and grade.
+
+Each question is a function of the quantities that its column reads. Its tests compare it with the
+key at random points; most of them are hidden from the students.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from math import nan
+from pathlib import Path
+from typing import Any
+
+from sympy import Basic, Dummy, Expr, Indexed, Symbol
+
+from kfsheet.coursework.judging.answer_key import ERROR, value_at
+from kfsheet.coursework.judging.precise_values import MISSING, cell_of
+from kfsheet.coursework.judging.random_samples import ALONE, Sample, Sampler
+from kfsheet.errors import ModelError
+from kfsheet.files import write_file
+from kfsheet.model.exercise import Exercise, Question
+from kfsheet.model.expressions import lag, t
+from kfsheet.printing.python import python_code
+
+POINTS_SHOWN, POINTS_HIDDEN = 1, 4
+BEGIN, END = "### BEGIN SOLUTION", "### END SOLUTION"
+HIDDEN = re.compile(r"### BEGIN HIDDEN TESTS.*?### END HIDDEN TESTS\n?", re.DOTALL)
+SOLUTION = re.compile(rf"( *){BEGIN}.*?{END}", re.DOTALL)
+START = (
+    "from math import *\n\n"
+    "from kfsheet.evaluation.numerics import observed, sign\n\n\n"
+    "def close(found, wanted):\n"
+    "    if isnan(wanted):\n"
+    "        return isnan(found)\n"
+    "    return isclose(found, wanted, rel_tol=1e-9, abs_tol=1e-12)"
+)
+
+
+def write_assignment(exercise: Exercise, out: str | Path) -> Path:
+    """Write ``nbgrader/source`` and ``nbgrader/release`` below ``out``; the latter is returned.
+
+    Raises
+    ------
+    ModelError
+        If nbformat is not installed, or the exercise asks nothing.
+    """
+    try:
+        import nbformat
+    except ImportError:
+        raise ModelError("notebooks need nbformat: pip install 'kfsheet[notebooks]'") from None
+    for kind in ("source", "release"):
+        made = assignment(exercise, solved=kind == "source")
+        path = Path(out) / "nbgrader" / kind / exercise.name / f"{exercise.name}.ipynb"
+        write_file(path, (nbformat.writes(made) + "\n").encode())
+    return path
+
+
+def assignment(exercise: Exercise, *, solved: bool) -> Any:
+    """The notebook, with solutions and hidden tests or, for students, without."""
+    from nbformat import v4
+
+    if not exercise.questions:
+        raise ModelError(f"{exercise.name} asks no questions; list them in Exercise(questions=...)")
+    cells = [
+        v4.new_markdown_cell("\n\n".join([f"# {exercise.title}", *exercise.about])),
+        v4.new_code_cell(START),
+        *(cell for question in exercise.questions for cell in _cells(exercise, question)),
+    ]
+    for number, cell in enumerate(cells, 1):
+        cell.id = f"cell-{number:02d}"
+        if not solved:
+            cell.source = HIDDEN.sub("", SOLUTION.sub(_blank, cell.source)).rstrip()
+    kernel = {"display_name": "Python 3", "language": "python", "name": "python3"}
+    return v4.new_notebook(cells=cells, metadata={"kernelspec": kernel})
+
+
+def _blank(match: re.Match[str]) -> str:
+    return f"{match[1]}# YOUR CODE HERE\n{match[1]}raise NotImplementedError()"
+
+
+def _cells(exercise: Exercise, question: Question) -> Iterator[Any]:
+    from nbformat import v4
+
+    model, name = exercise.model, question.name
+    scalar = model.derived_scalars.get(name)
+    item = scalar or model.column(name)
+    key, names = _with_arguments(item.expression)
+    words = f"**{name}** ({question.points}): {item.description}. {question.hint}"
+    yield v4.new_markdown_cell(words)
+    head = f"def {name}({', '.join(names.values())}):"
+    body = f"    {BEGIN}\n    return {python_code(key)}\n    {END}"
+    yield v4.new_code_cell(f"{head}\n{body}", metadata=_metadata(f"{name}-answer", solution=True))
+    tests = list(_tests(exercise, name, item.expression, names))
+    hidden = ["### BEGIN HIDDEN TESTS", *tests[POINTS_SHOWN:], "### END HIDDEN TESTS"]
+    text = "\n".join([*tests[:POINTS_SHOWN], *hidden])
+    yield v4.new_code_cell(text, metadata=_metadata(f"{name}-test", points=question.points))
+
+
+def _metadata(grade_id: str, *, solution: bool = False, points: int = 0) -> dict[str, Any]:
+    cell = {
+        "grade": bool(points),
+        "grade_id": grade_id,
+        "locked": bool(points),
+        "schema_version": 3,
+        "solution": solution,
+        "task": False,
+    }
+    return {"nbgrader": {**cell, "points": points} if points else cell}
+
+
+def _with_arguments(key: Expr) -> tuple[Expr, dict[Basic, str]]:
+    """The key as a function: cells become arguments, ``x_a[t - 1]`` is ``x_a_before``."""
+    names: dict[Basic, str] = {}
+    cells = sorted(key.atoms(Indexed), key=lambda c: (str(c.base.label), int(lag(c))))
+    for cell in cells:
+        names[cell] = str(cell.base.label) + ("", "_before", "_before2")[int(lag(cell))]
+    # The row t may stand in the index of a cell, in the formula itself, or in both.
+    stand_ins = {cell: Dummy(real=True) for cell in cells}
+    beside = key.xreplace(stand_ins).free_symbols - set(stand_ins.values())
+    for symbol in sorted(beside, key=str):
+        names[symbol] = symbol.name
+    return key.xreplace({node: Symbol(name, real=True) for node, name in names.items()}), names
+
+
+def _tests(exercise: Exercise, name: str, key: Expr, names: dict[Basic, str]) -> Iterator[str]:
+    sampler = Sampler(exercise.model)
+    row, number, count = exercise.model.rows // 2, 0, 0
+    while count < POINTS_SHOWN + POINTS_HIDDEN and number < 60:
+        sample = Sample(sampler, row, ALONE, number)
+        number += 1
+        wanted = value_at(key, sample)
+        if wanted is ERROR:
+            continue
+        count += 1
+        given = ", ".join(_number(_at(sample, node, row)) for node in names)
+        yield f"assert close({name}({given}), {_number(wanted)})"
+
+
+def _at(sample: Sample, node: Basic, row: int) -> Any:
+    if node == t:
+        return row
+    if node.is_Symbol:
+        return sample(node.name, 0)
+    name, fixed, place = cell_of(node)
+    return sample(name, place if fixed else row - place)
+
+
+def _number(value: Any) -> str:
+    """A value as source."""
+    missing = value is None or value is MISSING
+    number = nan if missing else float(value)
+    return "nan" if missing else repr(number)

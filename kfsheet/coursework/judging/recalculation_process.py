@@ -1,0 +1,56 @@
+"""A spreadsheet engine in a process of its own: a formula may take it for ever, or all memory.
+
+The process calls :func:`main`. It is sent what to calculate as a pickle, which
+comes from us, and answers in JSON, since what it read comes from somebody else.
+"""
+
+from __future__ import annotations
+
+import json
+import pickle
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from kfsheet.errors import EngineError, KfsheetError
+from kfsheet.parsing.references import Address
+from kfsheet.processes import answers, command
+from kfsheet.workbook.engines.recalculate import open_in
+from kfsheet.workbook.engines.spreadsheet_engine import CellValue, Changes
+
+
+def calculated(
+    path: Path, trials: Sequence[Changes], cells: Sequence[Address], seconds: float
+) -> list[list[CellValue]]:
+    """Values of some cells of a workbook, once for each set of numbers put in first.
+
+    Raises
+    ------
+    EngineError
+        If the engine fails or takes longer than ``seconds``.
+    """
+    asked = pickle.dumps((str(path), list(trials), list(cells)))
+    program = command("kfsheet.coursework.judging.recalculation_process", "main")
+    try:
+        done = subprocess.run(program, input=asked, capture_output=True, timeout=seconds)
+    except subprocess.TimeoutExpired:
+        raise EngineError(f"calculating took longer than {seconds:.0f} s") from None
+    if done.returncode:
+        raise EngineError("the engine could not calculate the workbook")
+    return json.loads(done.stdout)
+
+
+def main() -> int:
+    """Calculate what standard input asks for."""
+    path, trials, cells = pickle.loads(sys.stdin.buffer.read())  # from calculated() above
+    pipe = answers()
+    try:
+        engine = open_in(path)
+        found = [engine.values(changes) for changes in trials]
+    except KfsheetError:
+        return 1
+    wanted = [[v.get(c[0], {}).get(c[1:]) for c in cells] for v in found]
+    with pipe:
+        pipe.write(json.dumps(wanted).encode())
+    return 0
