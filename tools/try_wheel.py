@@ -1,8 +1,9 @@
-"""Build a wheel and an sdist, install them into empty environments, and use them there.
+"""Build a wheel and an sdist in dist/, install them into empty environments, and use them there.
 
 python tools/try_wheel.py
 """
 
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -11,7 +12,7 @@ from pathlib import Path
 import kfsheet
 
 ROOT = Path(__file__).parents[1]
-NEEDS_CHECK = "kfsheet[check]"
+DIST = ROOT / "dist"
 
 
 def run(*command: str | Path, cwd: Path, status: int = 0) -> str:
@@ -40,7 +41,7 @@ def try_without_extras(folder: Path, wheel: Path) -> None:
     assert (folder / "out" / "football.xlsx").read_bytes() == committed
     assert "K_x" in run(core / "kfsheet", "show", "football", "--as", "python", cwd=folder)
     said = run(core / "kfsheet", "check", "out/football.xlsx", cwd=folder, status=2)
-    assert NEEDS_CHECK in said, said
+    assert "kfsheet[check]" in said, said
     check_types(folder, core / "python")
 
 
@@ -63,18 +64,27 @@ def try_sdist(folder: Path, sdist: Path) -> None:
     assert "football" in run(kfsheet_, "show", "football", "--as", "table", cwd=folder)
 
 
+def built() -> tuple[Path, Path]:
+    """The wheel and the sdist, of the version that the package tells and a tag, if any, repeats."""
+    shutil.rmtree(DIST, ignore_errors=True)
+    run(sys.executable, "-m", "build", "--outdir", DIST, cwd=ROOT)
+    wheel, sdist = *DIST.glob("*.whl"), *DIST.glob("*.tar.gz")
+    assert wheel.name.startswith(f"kfsheet-{kfsheet.__version__}-")
+    tag = run("git", "tag", "--points-at", "HEAD", "v*", cwd=ROOT).strip()
+    assert tag in {"", f"v{kfsheet.__version__}"}, f"{tag} is not v{kfsheet.__version__}"
+    return wheel, sdist
+
+
 def main() -> None:
     """Build, install, use."""
+    wheel, sdist = built()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        run(sys.executable, "-m", "build", "--outdir", folder / "dist", ROOT, cwd=folder)
-        (wheel,), (sdist,) = (folder / "dist").glob("*.whl"), (folder / "dist").glob("*.tar.gz")
-        assert wheel.name.startswith(f"kfsheet-{kfsheet.__version__}-")
         try_without_extras(folder, wheel)
         try_check(folder, wheel)
         try_sdist(folder, sdist)
-        for path in (wheel, sdist):
-            print(f"{path.name}: {path.stat().st_size / 1000:.0f} kB, installed and tried")
+    for path in (wheel, sdist):
+        print(f"{path.name}: {path.stat().st_size / 1000:.0f} kB, installed and tried")
 
 
 if __name__ == "__main__":
