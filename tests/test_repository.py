@@ -7,8 +7,12 @@ from itertools import chain
 from pathlib import Path
 
 import pytest
+import yaml
 from conftest import MACHINE_PATH, without_images
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
+import kfsheet
 from kfsheet import load_exercise
 from kfsheet.cli.commands import parser
 from kfsheet.exercises import exercise_names
@@ -40,8 +44,23 @@ def test_no_workbook_is_left_of_an_exercise_that_is_gone():
 def test_every_file_that_readme_names_exists():
     for path in re.findall(r"`((?:workbooks|notebooks|tests|tools)/[^`]+)`", README):
         assert (ROOT / path).exists(), path
-    for path in re.findall(r"\]\(([^)]+)\)", README):
-        assert (ROOT / path).exists(), path
+
+
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CODE_OF_CONDUCT.md"]
+PAGES += [ROOT / "SECURITY.md", ROOT / "benchmarks" / "README.md", *ROOT.glob("docs/*.md")]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_link_to_a_file_leads_to_one(page):
+    for target in re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text()):
+        if "://" not in target:
+            assert (page.parent / target).exists(), target
+
+
+def test_readme_links_to_every_workbook_and_notebook():
+    files = [*ROOT.glob("workbooks/*.xlsx"), *ROOT.glob("notebooks/*.ipynb")]
+    links = set(re.findall(r"\]\(([^)]+)\)", README))
+    assert {path.relative_to(ROOT).as_posix() for path in files} <= links
 
 
 def test_readme_names_every_command():
@@ -50,13 +69,58 @@ def test_readme_names_every_command():
         assert f"kfsheet {command}" in README
 
 
-def test_the_environment_holds_every_pin_of_the_project():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    wanted = [*project["dependencies"], *chain(*project["optional-dependencies"].values())]
-    lines = (ROOT / "environment.txt").read_text().splitlines()
-    pins = {line.split(";")[0].strip().lower() for line in lines}
-    assert {w.lower() for w in wanted} <= pins
-    assert all("==" in line for line in lines if not line.startswith("#"))
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+EXTRAS = PROJECT["optional-dependencies"]
+
+
+def locked():
+    """Package -> the versions that environment.txt pins, one or one for each Python."""
+    versions = {}
+    for line in (ROOT / "environment.txt").read_text().splitlines():
+        if not line.startswith("#"):
+            requirement = Requirement(line)
+            (pin,) = requirement.specifier
+            assert pin.operator == "==", line
+            versions.setdefault(canonicalize_name(requirement.name), []).append(pin.version)
+    return versions
+
+
+def test_the_environment_holds_every_dependency_in_the_range_that_the_project_allows():
+    for wanted in map(Requirement, [*PROJECT["dependencies"], *chain(*EXTRAS.values())]):
+        if wanted.name != "kfsheet":
+            versions = locked()[canonicalize_name(wanted.name)]
+            assert all(wanted.specifier.contains(v, prereleases=True) for v in versions), wanted
+
+
+def test_a_range_has_a_lower_bound_and_no_upper():
+    """An upper bound is for the next major that is known to break; no such is known."""
+    for wanted in map(Requirement, [*PROJECT["dependencies"], *chain(*EXTRAS.values())]):
+        if wanted.name != "kfsheet":
+            assert [s.operator for s in wanted.specifier] == [">="], wanted
+
+
+def test_the_extra_all_is_every_extra_that_a_user_may_want():
+    (everything,) = map(Requirement, EXTRAS["all"])
+    assert everything.extras == set(EXTRAS) - {"all", "tests"}
+
+
+def test_pre_commit_formats_as_the_environment_does():
+    settings = (ROOT / ".pre-commit-config.yaml").read_text()
+    assert re.findall(r"rev: v(\S+)", settings) == locked()["ruff"]
+
+
+def test_the_citation_names_this_version():
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert citation["version"] == kfsheet.__version__
+    # What the format 1.2.0 requires.
+    assert {"cff-version", "message", "title", "authors"} <= set(citation)
+    assert citation["authors"] == [{"name": "The kfsheet authors"}]
+
+
+def test_the_changelog_begins_with_this_version():
+    headings = re.findall(r"^## (.*)$", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
+    assert headings[0] == kfsheet.__version__
+    assert len(set(headings)) == len(headings)
 
 
 def test_the_project_speaks_of_itself_alone():
@@ -67,7 +131,22 @@ def test_the_project_speaks_of_itself_alone():
         ["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True
     ).stdout.splitlines()
     for name in names:
-        if name.endswith((".py", ".md", ".toml", ".txt", ".csv", "Makefile", "run", ".ipynb")):
+        if name.endswith(
+            (
+                ".py",
+                ".md",
+                ".toml",
+                ".txt",
+                ".csv",
+                ".yml",
+                ".yaml",
+                ".cff",
+                ".pyi",
+                "Makefile",
+                "run",
+                ".ipynb",
+            )
+        ):
             text = without_images((ROOT / name).read_text())
             found = re.search(MACHINE_PATH + "|" + REGISTRY, text)
             assert not found, (name, found)

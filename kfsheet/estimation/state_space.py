@@ -27,7 +27,7 @@ class State:
     ----------
     unit, description : str
         Unit as in ``"m/s"``, and plain words.
-    start : Expr
+    start : Expr or float
         The analysis in row 0: a formula of parameters, or of other columns in row ``t``.
     variance : Expr
         Variance of its error, in unit squared.
@@ -35,7 +35,7 @@ class State:
 
     unit: str
     description: str
-    start: Expr
+    start: Expr | float
     variance: Expr
 
     def __post_init__(self) -> None:

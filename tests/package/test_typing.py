@@ -37,7 +37,6 @@ def test_a_users_script_is_typed_throughout():
     assert mypy(HERE / "users_script.py").startswith("Success")
 
 
-@pytest.mark.xfail(reason="study() is not public yet, and evaluate() may return a Study")
 def test_one_run_is_a_table_and_many_are_a_study():
     assert mypy(HERE / "users_study.py").startswith("Success")
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import assert_type
 
-from sympy import IndexedBase, Integer, Matrix, Symbol, diag
+from sympy import IndexedBase, Matrix, Symbol, diag
 
 import kfsheet
 from kfsheet import (
@@ -31,8 +31,8 @@ assert_type(t, Symbol)
 assert_type(dt, Symbol)
 assert_type(z_obs, IndexedBase)
 
-z, v, zero = Symbol("z", real=True), Symbol("v", real=True), Integer(0)
-state = {z: State("m", "position", zero, r_z), v: State("m/s", "velocity", zero, r_z / dt**2)}
+z, v = Symbol("z", real=True), Symbol("v", real=True)
+state = {z: State("m", "position", 0, r_z), v: State("m/s", "velocity", 0, r_z / dt**2)}
 noise = discrete_noise(Matrix([[0, 1], [0, 0]]), diag(0, q), dt)
 camera = Observation("z", z_obs[t], z, r_z, "m")
 add_filter(m, StateSpace(state, [z + v * dt, v], noise, [camera]), section="Filter")
