@@ -17,6 +17,8 @@ from kfsheet.coursework.judging.precise_values import (
     value_of,
 )
 from kfsheet.coursework.judging.random_samples import DEPTHS, NOBODY, OwnNumbers, Sample, Sampler
+from kfsheet.model.expressions import Missing
+from kfsheet.model.recurrence import Recurrence
 
 TOLERANCE = 1e-12
 TINY = 1e-20
@@ -44,6 +46,18 @@ def difference(found: Value | str, wanted: Value | str) -> float | None:
         return float("inf")
     far = precise_values.size(precise_values.difference(found, wanted))
     return 0.0 if far <= TINY else float(far / max(abs(found), abs(wanted)))
+
+
+def asked_steps(model: Recurrence, name: str) -> list[int]:
+    """Steps in which an answer is asked for; a derived scalar has the one step 0.
+
+    A start that is a plain number is given: there is no formula to find.
+    """
+    if name in model.derived_scalars:
+        return [0]
+    column = model.column(name)
+    given = [rule is Missing or rule.is_Number for rule in column.start]
+    return [k for k in range(model.rows) if not (k < len(given) and given[k])]
 
 
 class AnswerKey:

@@ -11,8 +11,13 @@ import time
 from functools import lru_cache
 from pathlib import Path
 
-from kfsheet.coursework.judging.answer_key import ERROR, answer_key, difference, value_at
-from kfsheet.coursework.judging.judge import asked_steps
+from kfsheet.coursework.judging.answer_key import (
+    ERROR,
+    answer_key,
+    asked_steps,
+    difference,
+    value_at,
+)
 from kfsheet.coursework.judging.precise_values import MISSING, Value, exact, is_real
 from kfsheet.coursework.judging.random_samples import ALONE, Sample, Sampler
 from kfsheet.coursework.judging.recalculation_process import calculated

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from kfsheet.coursework.handout import course_secret
-from kfsheet.coursework.handout.handouts import TOKEN_PROPERTY
+from kfsheet.coursework.handout.lock import TOKEN_PROPERTY
 from kfsheet.coursework.handout.own_numbers import own_numbers
 from kfsheet.coursework.judging.changed_cells import changed_cells
 from kfsheet.coursework.judging.diagnosis import EMPTY
