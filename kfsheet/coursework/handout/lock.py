@@ -23,7 +23,7 @@ def lock(
     book: Workbook, pages: list[Page], exercise: Exercise, secret: bytes, student: str
 ) -> None:
     """Sign a workbook, lock what is not an answer, and open it at the questions."""
-    # A second copy of the token: a hidden sheet is easily lost when sheets are copied.
+    # A second copy beside that on the hidden sheet: programs may lose the one or the other.
     token = course_secret.token(secret, exercise.name, student)
     book.custom_doc_props.append(StringProperty(name=TOKEN_PROPERTY, value=token))
     fill = PatternFill("solid", start_color="FFC6EFCE", end_color="FFC6EFCE")

@@ -54,7 +54,7 @@ from kfsheet.model.validation import columns_read
 CREDIT = {RIGHT: 1.0, HARD_CODED: 0.5, PARTLY: 0.5, GAPS: 0.5, NEARLY: 0.5}
 """Share of the points by status; what is not listed gets none."""
 NUMBER = re.compile(r"(?<!\w)\d+(?:\.\d+)?(?:e[+-]?\d+)?")
-FARTHEST = 8  # rows back; a key looks one or two rows back
+FARTHEST = 8  # rows back; keys look one or two back, and every row is computed at every sample
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Mark:
     fingerprint: str = ""
 
 
-Recalculated = Callable[[str], dict[int, bool]]
+Recalculated = Callable[[CellAddresses, str], dict[int, bool]]
 """Right or wrong by step, found by a spreadsheet engine, of the answer of that name."""
 
 
@@ -101,8 +101,9 @@ class Judge:
         if any(cell is None for cell in cells):
             words = "the table or the label of this answer is gone; hand in a file that has it"
             return Mark(asked.name, asked.points, 0.0, GONE, words)
+        # An engine calculates the whole workbook several times over: only where nothing else can.
         if any(cell.status == UNREADABLE for cell in cells):
-            found = self._recalculated(asked.name)
+            found = self._recalculated(self.addresses, asked.name)
             cells = [_decided(cell, found) for cell in cells]
         return self._marked(asked, cells)
 
@@ -123,8 +124,10 @@ class Judge:
         except FormulaError as error:
             return AnswerCell(step, address, UNREADABLE, words=str(error))
         lagged = as_lags(meaning.expression, step) if meaning.fixed_rows else meaning.expression
-        # A formula that asks for its own row is another function in every row.
+        # D$5 filled down reads one cell in every row. As a lag it is another formula in each of
+        # them, and right only in the row where that lag is the key's.
         own_row = asks_for_its_row(self._model, lagged)
+        # A formula that asks for its own row is another function in every row.
         key = (name, lagged, step if own_row else self._rule(name, step), own_row)
         if key not in self._verdicts:
             self._verdicts[key] = self._judged(name, AnswerCell(step, address, WRONG, lagged))
@@ -140,6 +143,7 @@ class Judge:
         return min(step, self._starts[name])
 
     def _judged(self, name: str, cell: AnswerCell) -> tuple[str, str]:
+        # At random samples a column is not computed, so that its sum there would mean nothing.
         if cell.expression.has(Aggregate):
             return UNREADABLE, "it takes a whole column"
         if not cell.expression.free_symbols and self._reads_nothing(cell):
@@ -173,8 +177,9 @@ class Judge:
             return Mark(asked.name, asked.points, float(asked.points), RIGHT, "")
         group = _largest_group(rest, lambda cell: self._rule(asked.name, cell.step))
         status, words, fingerprint = self._diagnosis(asked.name, group, rest)
+        # Half of the points are for an answer that is nearly one formula, not for a lucky row.
         if CREDIT.get(status) and 2 * (len(group) + len(right)) <= len(cells):
-            status, words = WRONG, PLAIN_WORDS[WRONG]  # a few rows do not stand for all
+            status, words = WRONG, PLAIN_WORDS[WRONG]
         if right:
             words = f"right in {rows_of(right)}; {not_in(self.book, rest, right)}: {words}"
             status = PARTLY if len(right) >= len(rest) else status
@@ -217,16 +222,10 @@ class Judge:
 def _decided(cell: AnswerCell, found: dict[int, bool]) -> AnswerCell:
     if cell.status != UNREADABLE or cell.step not in found:
         return cell
-    return AnswerCell(
-        cell.step,
-        cell.address,
-        RIGHT if found[cell.step] else WRONG,
-        words=(
-            ""
-            if found[cell.step]
-            else f"recalculated, since {cell.words}: other values than the key"
-        ),
-    )
+    if found[cell.step]:
+        return AnswerCell(cell.step, cell.address, RIGHT)
+    words = f"recalculated, since {cell.words}: other values than the key"
+    return AnswerCell(cell.step, cell.address, WRONG, words=words)
 
 
 def as_lags(expression: Basic, step: int) -> Basic:

@@ -29,7 +29,7 @@ from kfsheet.workbook.engines.ironcalc import CellValue
 RUNS = (0, 2, 4, 6, 1, 3)
 """Numbers of the samples: four near the model's own run, two anywhere."""
 HUGE = 1e12  # where a column feeds itself with numbers from anywhere, it may grow beyond sense
-TOLERANCE = 1e-9
+TOLERANCE = 1e-9  # an engine has doubles, and rounds on the way
 SECONDS = 60.0  # of an engine's time for one workbook, all answers together
 FEWEST = 3
 """Runs in which an answer must have a number to be called right."""
