@@ -9,7 +9,7 @@ from pathlib import Path
 from measuring import Line, seconds
 
 from kfsheet import load_exercise
-from kfsheet.coursework.handout.handouts import handout_bytes, solution_bytes
+from kfsheet.coursework.handout.handout_workbook import handout_bytes, solution_bytes
 from kfsheet.coursework.handout.own_numbers import own_numbers
 from kfsheet.coursework.reading.roster import Student
 from kfsheet.coursework.reports.assessment import assess

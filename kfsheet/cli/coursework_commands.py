@@ -12,6 +12,7 @@ from kfsheet.errors import DataError
 
 if TYPE_CHECKING:
     from kfsheet.coursework.reports.assessment import Assessment
+    from kfsheet.coursework.reports.grading import Handed, Result
 
 
 def add_commands(commands: argparse._SubParsersAction, exercise: str) -> None:
@@ -132,10 +133,7 @@ def run_grade(arguments: argparse.Namespace) -> int:
     results = override([with_all_marks(r, exercise) for r in results], iter(lines))
     for path in write_reports(exercise, results, handed, out):
         print(path)
-    statuses = Counter(result.status for result in results)
-    print("; ".join(f"{status}: {count}" for status, count in statuses.most_common()))
-    if lost := sum(file.of_nobody for file in handed):
-        print(f"files that belong to nobody: {lost}; see the end of {out / 'class.html'}")
+    _summarize(results, handed, out)
     if skipped := [path.name for path in passed_over(arguments.submissions, out)]:
         print(f"files passed over: {len(skipped)} ({', '.join(skipped[:5])})")
     found = [file.assessment for file in handed]
@@ -143,6 +141,13 @@ def run_grade(arguments: argparse.Namespace) -> int:
         complain(DataError("no file carries a token of this course; is --secret the right file?"))
         return DOES_NOT_HOLD
     return HOLDS
+
+
+def _summarize(results: list[Result], handed: list[Handed], out: Path) -> None:
+    statuses = Counter(result.status for result in results)
+    print("; ".join(f"{status}: {count}" for status, count in statuses.most_common()))
+    if lost := sum(file.of_nobody for file in handed):
+        print(f"files that belong to nobody: {lost}; see the end of {out / 'class.html'}")
 
 
 def _judged(item: tuple[Path, Assessment]) -> str:

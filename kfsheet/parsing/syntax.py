@@ -23,9 +23,7 @@ from kfsheet.parsing.references import read_reference
 
 LONGEST = 2_000  # characters; kfsheet's own stay below 255, Excel's limit is 8,192
 DEEPEST = 60  # levels of parentheses, calls and signs
-HIGHEST = (
-    256  # levels of a tree, say terms of a sum; each is three calls on Python's stack of 1,000
-)
+HIGHEST = 256  # levels of a tree, say terms of a sum; each is three calls on a stack of 1,000
 
 Tree = tuple
 

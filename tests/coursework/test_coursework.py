@@ -17,7 +17,7 @@ from students import ADA, SECRET, Paper
 from kfsheet import DataError, ModelError, load_exercise
 from kfsheet.cli import commands as cli
 from kfsheet.coursework.handout.course_secret import read_secret, read_token, token
-from kfsheet.coursework.handout.handouts import handout_bytes, own_run
+from kfsheet.coursework.handout.handout_workbook import handout_bytes, own_run
 from kfsheet.coursework.handout.own_numbers import own_numbers
 from kfsheet.coursework.handout.questions_sheet import FIRST, LOOKS_RIGHT, NOT_YET
 from kfsheet.coursework.judging.judge import CREDIT, Mark
@@ -263,7 +263,7 @@ def test_check_says_what_a_handout_is_for(handout, capsys):
 
 
 def test_a_solution_is_a_sound_workbook(tmp_path):
-    from kfsheet.coursework.handout.handouts import solution_bytes
+    from kfsheet.coursework.handout.handout_workbook import solution_bytes
 
     (tmp_path / "s.xlsx").write_bytes(solution_bytes(FOOTBALL, own_numbers(FOOTBALL, SECRET, "a")))
     report = check_workbook(tmp_path / "s.xlsx", FOOTBALL)

@@ -10,7 +10,7 @@ from students import ADA, SECRET, Paper
 
 import kfsheet.exercises
 from kfsheet import load_exercise
-from kfsheet.coursework.handout.handouts import handout_bytes
+from kfsheet.coursework.handout.handout_workbook import handout_bytes
 from kfsheet.coursework.reading.roster import Student
 from kfsheet.coursework.reports.assessment import assess
 from kfsheet.coursework.reports.grading import _judged

@@ -13,7 +13,7 @@ import students as do
 from students import ADA, SECRET, Paper
 
 from kfsheet import load_exercise
-from kfsheet.coursework.handout.handouts import handout_bytes
+from kfsheet.coursework.handout.handout_workbook import handout_bytes
 from kfsheet.coursework.judging.worker_pool import Failed, Pool
 from kfsheet.coursework.reading import submission
 from kfsheet.coursework.reading.submission import read_submission

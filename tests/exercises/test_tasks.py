@@ -7,7 +7,8 @@ from students import ADA, SECRET
 from sympy import Indexed
 
 from kfsheet import load_exercise
-from kfsheet.coursework.handout.handouts import handout_pages, own_run
+from kfsheet.coursework.handout.empty_answers import with_empty_answers
+from kfsheet.coursework.handout.handout_workbook import own_run
 from kfsheet.coursework.handout.own_numbers import own_numbers
 from kfsheet.coursework.handout.questions_sheet import question_pages
 from kfsheet.exercises import exercise_names
@@ -47,7 +48,7 @@ def test_the_sheet_of_questions_names_all_that_an_answer_is_made_of(name):
 def test_what_looks_like_an_answer_in_a_sealed_worksheet_is_live_and_not_shown(name):
     exercise = load_exercise(name)
     layout, now = Layout.standard(exercise.model), Run.of(exercise.model)
-    pages = [p for p in handout_pages(exercise, layout, now) if p.title in exercise.sealed]
+    pages = [p for p in with_empty_answers(exercise, layout, now) if p.title in exercise.sealed]
     asked = {(layout.home(q.name)) for q in exercise.questions if q.name in exercise.model.table}
     assert {sheet for sheet, _ in asked} == {page.title for page in pages}
     for page in pages:

@@ -6,7 +6,7 @@ import openpyxl
 import pytest
 
 from kfsheet import DataError, EngineError, WorkbookError, check_workbook, recalculate
-from kfsheet.coursework.handout.handouts import solution_bytes
+from kfsheet.coursework.handout.handout_workbook import solution_bytes
 from kfsheet.coursework.handout.own_numbers import own_numbers
 from kfsheet.exercises import exercise_names, load_exercise
 from kfsheet.exercises.football import exercise

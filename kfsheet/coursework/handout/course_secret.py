@@ -31,6 +31,7 @@ def read_secret(path: str | Path, *, make: bool = False) -> bytes:
     try:
         if make and not path.exists():
             path.parent.mkdir(parents=True, exist_ok=True)
+            # Never over another secret, and for the owner only from its first byte on.
             handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
             with os.fdopen(handle, "w") as file:
                 file.write(secrets.token_hex(LENGTH) + "\n")
@@ -44,6 +45,7 @@ def read_secret(path: str | Path, *, make: bool = False) -> bytes:
 
 def digest(secret: bytes, *parts: str) -> bytes:
     """HMAC of parts, which may hold any characters."""
+    # A separator that no name holds: ("a", "bc") and ("ab", "c") must not sign alike.
     message = "\x1f".join(parts).encode()
     return hmac.new(secret, message, hashlib.sha256).digest()
 

@@ -27,6 +27,7 @@ def own_numbers(exercise: Exercise, secret: bytes, student: str) -> OwnNumbers:
     for attempt in range(ATTEMPTS):
         dice = RandomState(course_secret.seed(secret, exercise.name, student, str(attempt)))
         parameters, data = _drawn(exercise, dice)
+        # Ranges that are each sensible may have no value together, say a root of less than 0.
         try:
             run(exercise.model, data, parameters)
         except DataError as error:

@@ -83,6 +83,8 @@ def fitting_salt(
     for salt in salts(secret, exercise, student, name, len(values)):
         terms = [w * v for w, v in zip(salt.weights, values, strict=True) if not isnan(v)]
         total = sum(terms)
+        # Where terms cancel, programs that add in another order differ in the figures that count;
+        # and a figure that ends near 5 may round either way.
         if abs(total) <= 0.02 * sum(map(abs, terms)):
             continue
         mantissa = abs(total) / 10 ** (floor(log10(abs(total))) - 2)

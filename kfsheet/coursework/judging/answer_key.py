@@ -17,8 +17,10 @@ from kfsheet.coursework.judging.precise_values import (
     value_of,
 )
 from kfsheet.coursework.judging.random_samples import DEPTHS, NOBODY, OwnNumbers, Sample, Sampler
+from kfsheet.model.expressions import Missing
+from kfsheet.model.recurrence import Recurrence
 
-TOLERANCE = 1e-12
+TOLERANCE = 1e-12  # far above 30 figures, far below the rounding of a constant typed by hand
 TINY = 1e-20
 ROUGH = 3e-3
 """How far most values of a formula may be off for it to be called nearly right."""
@@ -44,6 +46,18 @@ def difference(found: Value | str, wanted: Value | str) -> float | None:
         return float("inf")
     far = precise_values.size(precise_values.difference(found, wanted))
     return 0.0 if far <= TINY else float(far / max(abs(found), abs(wanted)))
+
+
+def asked_steps(model: Recurrence, name: str) -> list[int]:
+    """Steps in which an answer is asked for; a derived scalar has the one step 0.
+
+    A start that is a plain number is given: there is no formula to find.
+    """
+    if name in model.derived_scalars:
+        return [0]
+    column = model.column(name)
+    given = [rule is Missing or rule.is_Number for rule in column.start]
+    return [k for k in range(model.rows) if not (k < len(given) and given[k])]
 
 
 class AnswerKey:
@@ -77,15 +91,18 @@ class AnswerKey:
             if sample.gaps and not gaps:
                 continue
             found = value_at(expression, sample)
+            # Wild samples leave the range for which a formula is meant: one that takes a root
+            # where the key takes none is not wrong for that.
             if sample.wild and found is ERROR:
-                continue  # beyond the range for which the formula is meant
+                continue
             if (far := difference(found, self.wanted(sample))) is not None:
                 yield far
 
     def same(self, expression: Basic, own: OwnNumbers = NOBODY, gaps: bool = True) -> bool:
         """Whether an expression is the key's function, alone or with what the key builds on."""
-        if expression == self.key:
+        if expression == self.key:  # most right answers are the key itself, filled down
             return True
+        # Depth by depth: alone, or with the columns beside it written out as the key has them.
         return any(self._agrees(expression, depth, own, gaps) for depth in DEPTHS)
 
     def _agrees(self, expression: Basic, depth: int, own: OwnNumbers, gaps: bool) -> bool:

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 from openpyxl.utils import get_column_letter
 
+from kfsheet.coursework.judging.answer_key import asked_steps
 from kfsheet.coursework.judging.formula_meaning import Interpreter, Meaning
-from kfsheet.coursework.judging.judge import asked_steps
 from kfsheet.coursework.judging.random_samples import OwnNumbers
 from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.coursework.reading.submission import Book

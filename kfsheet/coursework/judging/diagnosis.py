@@ -69,6 +69,7 @@ def diagnose(
     fingerprint = digest_of(name, values)
     everywhere = [answer_key(sampler, name, k) for k in steps]
     parameters = OwnNumbers(own.parameters)
+    # The order matters: a constant that is typed is also "nearly right", and its words say more.
     if _has_a_number(asked, expression) and all(q.same(expression, parameters) for q in everywhere):
         names = _still(asked, expression, own) or ["a parameter"]
         many = len(names) > 1
@@ -138,7 +139,7 @@ def known_mistakes(sampler: Sampler, name: str, step: int) -> dict[tuple[str, ..
     asked = answer_key(sampler, name, step)
     found: dict[tuple[str, ...], str] = {}
     for n, (words, key) in enumerate(typical_mistakes(sampler.model, asked.key)):
-        if n >= MOST:
+        if n >= MOST:  # a long key has more; likely mistakes come first
             break
         found.setdefault(asked.values(key), words)
     found.pop(asked.values(asked.key), None)

@@ -82,6 +82,7 @@ class Interpreter:
             raise ForbiddenError(f"{words} is not allowed")
         if formula.array:
             raise FormulaError("an array formula is not read as mathematics")
+        # Helper cells are the student's own: they may lead in a circle, or double at each step.
         if address in self._open:
             raise FormulaError("the formula goes in a circle through its helper cells")
         if len(self._open) >= DEEPEST_HELPERS:
@@ -126,6 +127,7 @@ class Interpreter:
         if text is None:
             raise FormulaError(f"there is no name {reference.name}")
         formula = Formula(text if text.startswith("=") else f"={text}", (1, 1))
+        # A name for one cell is that cell; any other name is a formula of its own.
         key, found = parsed(formula)
         if _trees[key][0][0] == "reference" and not found[0].name:
             return self._slot(found[0], (found[0].sheet or host[0], 1, 1), step)
@@ -157,6 +159,7 @@ class Interpreter:
 @lru_cache(maxsize=20_000)
 def forbidden(text: str) -> str | None:
     """What a formula uses that no answer may use, if there is such a thing."""
+    # As text, before anything is parsed: also in a branch that is never taken, or in a string.
     upper = text.upper()
     if found := next((name for name in DANGEROUS if f"{name}(" in upper), None):
         return found

@@ -10,12 +10,17 @@ import re
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 
-from openpyxl.utils import get_column_letter
 from sympy import Basic, Indexed
 
-from kfsheet.coursework.judging.answer_key import answer_key
+from kfsheet.coursework.judging.answer_key import answer_key, asked_steps
+from kfsheet.coursework.judging.answer_rows import (
+    AnswerCell,
+    content_of,
+    fixed_row,
+    not_in,
+    rows_of,
+)
 from kfsheet.coursework.judging.circular_references import circular_reference
 from kfsheet.coursework.judging.diagnosis import (
     EMPTY,
@@ -43,15 +48,13 @@ from kfsheet.coursework.reading.submission import Book
 from kfsheet.coursework.reading.worksheet import Formula
 from kfsheet.errors import ForbiddenError, FormulaError
 from kfsheet.model.exercise import Exercise, Question
-from kfsheet.model.expressions import Aggregate, Missing, lag, t
-from kfsheet.model.recurrence import Recurrence
+from kfsheet.model.expressions import Aggregate, lag, t
 from kfsheet.model.validation import columns_read
-from kfsheet.parsing.references import Address, Reference
 
 CREDIT = {RIGHT: 1.0, HARD_CODED: 0.5, PARTLY: 0.5, GAPS: 0.5, NEARLY: 0.5}
 """Share of the points by status; what is not listed gets none."""
 NUMBER = re.compile(r"(?<!\w)\d+(?:\.\d+)?(?:e[+-]?\d+)?")
-FARTHEST = 8  # rows back; a key looks one or two rows back
+FARTHEST = 8  # rows back; keys look one or two back, and every row is computed at every sample
 
 
 @dataclass(frozen=True)
@@ -66,32 +69,8 @@ class Mark:
     fingerprint: str = ""
 
 
-@dataclass(frozen=True)
-class Cell:
-    """One row of an answer: what was found there."""
-
-    step: int
-    address: Address
-    status: str
-    expression: Basic | None = None
-    fixed: tuple[int, ...] = ()
-    words: str = ""
-
-
-Recalculated = Callable[[str], dict[int, bool]]
+Recalculated = Callable[[CellAddresses, str], dict[int, bool]]
 """Right or wrong by step, found by a spreadsheet engine, of the answer of that name."""
-
-
-def asked_steps(model: Recurrence, name: str) -> list[int]:
-    """Steps in which an answer is asked for; a derived scalar has the one step 0.
-
-    A start that is a plain number is given: there is no formula to find.
-    """
-    if name in model.derived_scalars:
-        return [0]
-    column = model.column(name)
-    given = [rule is Missing or rule.is_Number for rule in column.start]
-    return [k for k in range(model.rows) if not (k < len(given) and given[k])]
 
 
 class Judge:
@@ -122,36 +101,39 @@ class Judge:
         if any(cell is None for cell in cells):
             words = "the table or the label of this answer is gone; hand in a file that has it"
             return Mark(asked.name, asked.points, 0.0, GONE, words)
+        # An engine calculates the whole workbook several times over: only where nothing else can.
         if any(cell.status == UNREADABLE for cell in cells):
-            found = self._recalculated(asked.name)
+            found = self._recalculated(self.addresses, asked.name)
             cells = [_decided(cell, found) for cell in cells]
         return self._marked(asked, cells)
 
-    def _read(self, name: str, step: int) -> Cell | None:
+    def _read(self, name: str, step: int) -> AnswerCell | None:
         address = self.addresses.of(name, step)
         if address is None:
             return None
         content = self.book.sheets[address[0]].get(address[1:])
         if content is None or content == "":
-            return Cell(step, address, EMPTY)
+            return AnswerCell(step, address, EMPTY)
         if not isinstance(content, Formula):
             words = "a text stands where a formula is asked for"
-            return Cell(step, address, TYPED, words=words if isinstance(content, str) else "")
+            return AnswerCell(step, address, TYPED, words=words if isinstance(content, str) else "")
         try:
             meaning = self._interpreter.meaning(address, step)
         except ForbiddenError as error:
-            return Cell(step, address, REFUSED, words=str(error))
+            return AnswerCell(step, address, REFUSED, words=str(error))
         except FormulaError as error:
-            return Cell(step, address, UNREADABLE, words=str(error))
+            return AnswerCell(step, address, UNREADABLE, words=str(error))
         lagged = as_lags(meaning.expression, step) if meaning.fixed_rows else meaning.expression
-        # A formula that asks for its own row is another function in every row.
+        # D$5 filled down reads one cell in every row. As a lag it is another formula in each of
+        # them, and right only in the row where that lag is the key's.
         own_row = asks_for_its_row(self._model, lagged)
+        # A formula that asks for its own row is another function in every row.
         key = (name, lagged, step if own_row else self._rule(name, step), own_row)
         if key not in self._verdicts:
-            self._verdicts[key] = self._judged(name, Cell(step, address, WRONG, lagged))
+            self._verdicts[key] = self._judged(name, AnswerCell(step, address, WRONG, lagged))
         status, words = self._verdicts[key]
         expression = None if status in (UNREADABLE, TYPED) else meaning.expression
-        return Cell(step, address, status, expression, meaning.fixed_rows, words)
+        return AnswerCell(step, address, status, expression, meaning.fixed_rows, words)
 
     def _rule(self, name: str, step: int) -> int:
         """Number of the rule that holds in a step: a start value, or the general one."""
@@ -160,7 +142,8 @@ class Judge:
             self._starts[name] = 0 if scalar else len(self._model.column(name).start)
         return min(step, self._starts[name])
 
-    def _judged(self, name: str, cell: Cell) -> tuple[str, str]:
+    def _judged(self, name: str, cell: AnswerCell) -> tuple[str, str]:
+        # At random samples a column is not computed, so that its sum there would mean nothing.
         if cell.expression.has(Aggregate):
             return UNREADABLE, "it takes a whole column"
         if not cell.expression.free_symbols and self._reads_nothing(cell):
@@ -176,36 +159,38 @@ class Judge:
             right = answer_key(self._sampler, name, cell.step).same(cell.expression, own)
         return RIGHT if right else WRONG, ""
 
-    def _repeats(self, name: str, cell: Cell) -> str:
+    def _repeats(self, name: str, cell: AnswerCell) -> str:
         """A column that hides the answer's own formula, if this one reads it unlike the key."""
         key = answer_key(self._sampler, name, cell.step).key
         given = columns_read(cell.expression) - columns_read(key)
         return next((column for column in self._exercise.veiled if column in given), "")
 
-    def _reads_nothing(self, cell: Cell) -> bool:
-        content = self.book.sheets[cell.address[0]][cell.address[1:]]
-        return not parsed(content)[1]
+    def _reads_nothing(self, cell: AnswerCell) -> bool:
+        return not parsed(content_of(self.book, cell))[1]
 
     # -- from cells to a mark --------------------------------------------------------------
 
-    def _marked(self, asked: Question, cells: list[Cell]) -> Mark:
+    def _marked(self, asked: Question, cells: list[AnswerCell]) -> Mark:
         right = [c for c in cells if c.status == RIGHT]
         rest = [c for c in cells if c.status != RIGHT]
         if not rest:
             return Mark(asked.name, asked.points, float(asked.points), RIGHT, "")
         group = _largest_group(rest, lambda cell: self._rule(asked.name, cell.step))
         status, words, fingerprint = self._diagnosis(asked.name, group, rest)
+        # Half of the points are for an answer that is nearly one formula, not for a lucky row.
         if CREDIT.get(status) and 2 * (len(group) + len(right)) <= len(cells):
-            status, words = WRONG, PLAIN_WORDS[WRONG]  # a few rows do not stand for all
+            status, words = WRONG, PLAIN_WORDS[WRONG]
         if right:
-            words = f"right in {_rows(right)}; {self._where(rest, right)}: {words}"
+            words = f"right in {rows_of(right)}; {not_in(self.book, rest, right)}: {words}"
             status = PARTLY if len(right) >= len(rest) else status
         elif status == EMPTY:
             words = ""  # the status says it
         score = asked.points * CREDIT.get(status, 0.0)
         return Mark(asked.name, asked.points, score, status, words, fingerprint)
 
-    def _diagnosis(self, name: str, group: list[Cell], rest: list[Cell]) -> tuple[str, str, str]:
+    def _diagnosis(
+        self, name: str, group: list[AnswerCell], rest: list[AnswerCell]
+    ) -> tuple[str, str, str]:
         """Status, words and fingerprint of the most frequent kind of cell that is not right."""
         culprit = group[0]
         if culprit.expression is None:
@@ -225,59 +210,22 @@ class Judge:
             circle = circular_reference(self._interpreter, self.addresses, name, culprit.step)
             words = f"it goes in a circle: {' -> '.join(circle)}" if circle else words
         if status == WRONG and culprit.fixed and len(rest) > 1:
-            words = f"every row refers to {self._fixed_words(culprit)}; {words}"
+            words = f"every row refers to {fixed_row(self.book, self.addresses, culprit)}; {words}"
         return status, words, fingerprint
 
-    def _typed_fingerprint(self, name: str, group: list[Cell]) -> str:
+    def _typed_fingerprint(self, name: str, group: list[AnswerCell]) -> str:
         """Equal numbers in the files of two students, whose data differ, were not computed."""
-        found = [self.book.sheets[c.address[0]].get(c.address[1:]) for c in group]
+        found = [content_of(self.book, cell) for cell in group]
         return digest_of(name, [f"{v:.9g}" if isinstance(v, float) else str(v) for v in found])
 
-    def _where(self, rest: list[Cell], right: list[Cell]) -> str:
-        first = rest[0]
-        content = self.book.sheets[first.address[0]].get(first.address[1:])
-        if not isinstance(content, Formula):
-            return f"not in {_rows(rest)}"
-        usual = self.book.sheets[right[-1].address[0]][right[-1].address[1:]]
-        known = set(parsed(usual)[1])
-        try:
-            strange = [r for r in parsed(content)[1] if r not in known]
-        except FormulaError:
-            strange = []
-        names = ", ".join(dict.fromkeys(_show(r, first.address[1:]) for r in strange))
-        return f"not in {_rows(rest)}" + (
-            f" (row {first.address[1]} refers to {names})" * bool(names)
-        )
 
-    def _fixed_words(self, cell: Cell) -> str:
-        content = self.book.sheets[cell.address[0]][cell.address[1:]]
-        fixed = (r for r in parsed(content)[1] if r.first and r.first.row_fixed)
-        shown = (
-            _show(r, cell.address[1:])
-            for r in fixed
-            if isinstance(
-                self.addresses.role(
-                    (r.sheet or cell.address[0], r.first.row, r.first.at(cell.address[1:])[1])
-                ),
-                tuple,
-            )
-        )
-        return ", ".join(dict.fromkeys(shown)) or "a fixed row"
-
-
-def _decided(cell: Cell, found: dict[int, bool]) -> Cell:
+def _decided(cell: AnswerCell, found: dict[int, bool]) -> AnswerCell:
     if cell.status != UNREADABLE or cell.step not in found:
         return cell
-    return Cell(
-        cell.step,
-        cell.address,
-        RIGHT if found[cell.step] else WRONG,
-        words=(
-            ""
-            if found[cell.step]
-            else f"recalculated, since {cell.words}: other values than the key"
-        ),
-    )
+    if found[cell.step]:
+        return AnswerCell(cell.step, cell.address, RIGHT)
+    words = f"recalculated, since {cell.words}: other values than the key"
+    return AnswerCell(cell.step, cell.address, WRONG, words=words)
 
 
 def as_lags(expression: Basic, step: int) -> Basic:
@@ -291,48 +239,21 @@ def farthest(expression: Basic) -> int:
     return max((abs(int(lag(c))) for c in expression.atoms(Indexed)), default=0)
 
 
-def _largest_group(rest: list[Cell], rule_of: Callable[[Cell], int]) -> list[Cell]:
+def _largest_group(
+    rest: list[AnswerCell], rule_of: Callable[[AnswerCell], int]
+) -> list[AnswerCell]:
     """Cells with the same formula under the same rule; of equally many those of the later rule."""
-    groups: dict[tuple, list[Cell]] = {}
+    groups: dict[tuple, list[AnswerCell]] = {}
     for cell in rest:
         key = (cell.status, cell.expression, cell.words, rule_of(cell))
         groups.setdefault(key, []).append(cell)
     return max(groups.items(), key=lambda group: (len(group[1]), group[0][-1]))[1]
 
 
-def _numbers_in_disguise(rest: list[Cell]) -> bool:
+def _numbers_in_disguise(rest: list[AnswerCell]) -> bool:
     """Whether rows differ in nothing but their numbers: pasted values with something around."""
     found = {c.expression for c in rest if c.expression is not None}
     if len(found) < 4 or 2 * len(found) <= len(rest):
         return False
     shapes = Counter(NUMBER.sub("#", str(e)) for e in found)
     return 2 * shapes.most_common(1)[0][1] > len(found)
-
-
-def _rows(cells: list[Cell]) -> str:
-    """Rows of a sheet in words: "rows 6-13, 15"."""
-    numbers = sorted(cell.address[1] for cell in cells)
-    runs: list[list[int]] = [[numbers[0]]]
-    for before, now in pairwise(numbers):
-        if now == before + 1:
-            runs[-1].append(now)
-        else:
-            runs.append([now])
-    shown = [f"{run[0]}-{run[-1]}" if len(run) > 1 else str(run[0]) for run in runs]
-    more = ", ..." if len(shown) > 5 else ""
-    return f"row{'s' * (len(numbers) > 1)} {', '.join(shown[:5])}{more}"
-
-
-def _show(reference: Reference, host: tuple[int, int]) -> str:
-    """A reference as the student typed it."""
-    if reference.name:
-        return reference.name
-    shown = []
-    for corner in filter(None, (reference.first, reference.last)):
-        row, column = corner.at(host)
-        if row < 1 or column < 1:
-            return "a cell outside the sheet"
-        shown.append(
-            f"{'$' * corner.column_fixed}{get_column_letter(column)}{'$' * corner.row_fixed}{row}"
-        )
-    return (f"{reference.sheet}!" if reference.sheet else "") + ":".join(shown)

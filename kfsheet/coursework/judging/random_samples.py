@@ -69,6 +69,7 @@ class Sample:
         """Value of a scalar (row 0), or of a column in a row."""
         key = (name, row)
         if key not in self._known:
+            # Whoever asks for it while it is computed, asks in a circle.
             self._known[key] = NoValueError("it goes in a circle")
             try:
                 self._known[key] = self._computed(name, row)
@@ -171,7 +172,7 @@ class Sampler:
         """Samples for the formulas of one question in one row; those without gaps come first."""
         key = (name, row, depth, own)
         if key not in self._samples:
-            if len(self._samples) > 2_000:
+            if len(self._samples) > 2_000:  # own numbers make new ones for every student
                 self._samples.clear()
             gaps = any(c.may_be_missing for c in self.model.all_columns())
             count = WITHOUT_GAPS + WITH_GAPS * gaps

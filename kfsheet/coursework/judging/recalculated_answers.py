@@ -11,8 +11,13 @@ import time
 from functools import lru_cache
 from pathlib import Path
 
-from kfsheet.coursework.judging.answer_key import ERROR, answer_key, difference, value_at
-from kfsheet.coursework.judging.judge import asked_steps
+from kfsheet.coursework.judging.answer_key import (
+    ERROR,
+    answer_key,
+    asked_steps,
+    difference,
+    value_at,
+)
 from kfsheet.coursework.judging.precise_values import MISSING, Value, exact, is_real
 from kfsheet.coursework.judging.random_samples import ALONE, Sample, Sampler
 from kfsheet.coursework.judging.recalculation_process import calculated
@@ -23,7 +28,7 @@ from kfsheet.workbook.engines.spreadsheet_engine import CellValue, Changes
 RUNS = (0, 2, 4, 6, 1, 3)
 """Numbers of the samples: four near the model's own run, two anywhere."""
 HUGE = 1e12  # where a column feeds itself with numbers from anywhere, it may grow beyond sense
-TOLERANCE = 1e-9
+TOLERANCE = 1e-9  # an engine has doubles, and rounds on the way
 SECONDS = 60.0  # of an engine's time for one workbook, all answers together
 FEWEST = 3
 """Runs in which an answer must have a number to be called right."""

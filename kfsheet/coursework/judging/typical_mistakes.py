@@ -57,19 +57,9 @@ def _replaced(e: Basic, path: tuple[int, ...], new: Basic) -> Basic:
 
 def _of_node(model: Recurrence, e: Basic) -> Iterator[tuple[str, Expr]]:
     if isinstance(e, Add):
-        for n, term in enumerate(e.args):
-            rest = [*e.args[:n], *e.args[n + 1 :]]
-            yield SIGN, Add(*rest, -term)
-            yield TERM, Add(*rest)
-            yield TWO, Add(*rest, 2 * term)
-            yield TWO, Add(*rest, term / 2)
+        yield from _of_sum(e)
     elif isinstance(e, Mul):
-        for n, factor in enumerate(e.args):
-            rest = [*e.args[:n], *e.args[n + 1 :]]
-            words = SIGN if factor == -1 else NO_SIGN if isinstance(factor, sign) else FACTOR
-            yield words, Mul(*rest)
-            if factor != -1:
-                yield INVERSE, Mul(*rest, 1 / factor)
+        yield from _of_product(e)
     elif isinstance(e, Pow):
         yield FACTOR, Integer(1)
         yield EXPONENT, e.base
@@ -89,6 +79,25 @@ def _of_node(model: Recurrence, e: Basic) -> Iterator[tuple[str, Expr]]:
         yield NO_SIGN, e.args[0]
     elif isinstance(e, Indexed | Symbol) and e != t:
         yield from _of_atom(model, e)
+
+
+def _of_sum(e: Add) -> Iterator[tuple[str, Expr]]:
+    for n, term in enumerate(e.args):
+        rest = [*e.args[:n], *e.args[n + 1 :]]
+        yield SIGN, Add(*rest, -term)
+        yield TERM, Add(*rest)
+        yield TWO, Add(*rest, 2 * term)
+        yield TWO, Add(*rest, term / 2)
+
+
+def _of_product(e: Mul) -> Iterator[tuple[str, Expr]]:
+    for n, factor in enumerate(e.args):
+        rest = [*e.args[:n], *e.args[n + 1 :]]
+        # What is lost with a factor -1 or sign(x) is not a quantity that somebody forgot.
+        words = SIGN if factor == -1 else NO_SIGN if isinstance(factor, sign) else FACTOR
+        yield words, Mul(*rest)
+        if factor != -1:
+            yield INVERSE, Mul(*rest, 1 / factor)
 
 
 def _of_atom(model: Recurrence, e: Indexed | Symbol) -> Iterator[tuple[str, Expr]]:

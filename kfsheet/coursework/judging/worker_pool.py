@@ -17,11 +17,9 @@ from typing import Any
 
 from kfsheet.errors import EngineError
 
-MEMORY = 3 * 2**30  # bytes of address space
+MEMORY = 3 * 2**30  # bytes of address space; libraries alone reserve a good part of it
 SECONDS = 120.0
 BATCH = 25  # files that a worker of an executor judges before it reports
-
-
 READY = "ready"
 
 
@@ -42,7 +40,7 @@ class Failed:
 
 
 def _serve(pipe: Connection, function: Callable[..., Any], memory: int) -> None:
-    _limit(memory)
+    _limit(memory)  # before the first file is opened
     pipe.send(READY)
     while (arguments := pipe.recv()) is not None:
         try:
@@ -112,6 +110,7 @@ class Pool:
         memory: int = MEMORY,
     ) -> None:
         self._function, self._seconds, self._memory = function, seconds, memory
+        # Not forked: a fork shares the memory, and the locks, of whatever runs beside it.
         self._context = multiprocessing.get_context("spawn")
         self._jobs = jobs
         self._workers: list[_Worker] = []

@@ -52,6 +52,8 @@ class CellAddresses:
                     addresses.columns.setdefault(name, (table, number))
         for name in (*model.parameters, *model.derived_scalars, *model.summaries):
             address = named_cell(book, name)
+            # Rows inserted by a program that does not move names leave the name on another cell;
+            # the label to the left tells, and is what a person goes by.
             if address is None or _left_of(book, address) != name:
                 address = _labelled(book, name) or address
             if address:
@@ -88,6 +90,7 @@ def _find_table(
         for sheet, rows in headers.items()
         for row, header in rows.items()
     }
+    # More than half: a copy of a few columns, which students make, is not the table.
     if 2 * max(counts.values(), default=0) <= len(order):
         return None
     sheet, row = max(counts, key=counts.get)

@@ -80,6 +80,7 @@ def read_submission(path: str | Path) -> Book:
         raise
     except DefusedXmlException:
         raise SubmissionError("refused", "its XML declares a document type") from None
+    # Whatever a damaged file makes of these libraries is the file's fault; MemoryError is not here.
     except (
         zipfile.BadZipFile, zipfile.LargeZipFile, zlib.error, EOFError, KeyError, ValueError,
         ParseError, expat.ExpatError, NotImplementedError, RuntimeError, RecursionError, OSError,
@@ -96,7 +97,7 @@ def _check_kind(content: bytes) -> None:
         if ENCRYPTED in content:
             raise SubmissionError("encrypted", "the file is encrypted; save it without a password")
         raise SubmissionError("wrong kind", "this is an old .xls file; save it as .xlsx")
-    if not content.startswith(b"PK"):
+    if not content.startswith(b"PK"):  # what a file holds counts, not what it is called
         raise SubmissionError("wrong kind", "this is no .xlsx file, whatever its name says")
 
 
@@ -130,10 +131,12 @@ def _check_parts(archive: zipfile.ZipFile) -> None:
     if len(items) > MOST_PARTS:
         raise SubmissionError("too large", f"the file holds {len(items)} parts")
     names = [item.filename for item in items]
+    # Programs differ in which of two equal names they read: one may show what another judges.
     if len(set(names)) < len(names):
         raise SubmissionError("refused", "two parts of the file have the same name")
     for item in items:
         name = item.filename.replace("\\", "/")
+        # Nothing is unpacked here; a lecturer's next program may do so.
         if name.startswith("/") or ".." in name.split("/"):
             raise SubmissionError("refused", "a part of the file is named to leave its folder")
         if item.flag_bits & 1:
@@ -162,6 +165,7 @@ class _Parts:
         self.names = set(archive.namelist())
 
     def read(self, name: str) -> bytes:
+        # The directory's size is the sender's word; only what comes out counts.
         with self._archive.open(name) as part:
             content = part.read(LARGEST_PART + 1)
         if len(content) > LARGEST_PART:

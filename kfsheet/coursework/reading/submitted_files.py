@@ -46,6 +46,7 @@ def _walk(folder: Path, without: Path | None) -> Iterator[tuple[Path, bool]]:
     ours = without and without.resolve()
     for path in folder.iterdir():
         hidden = path.name.startswith((".", "~$")) or path.name in IGNORED
+        # A link could name any file of the lecturer's machine; ~$ is Excel's note of an open file.
         if hidden or path.is_symlink():
             yield path, False
         elif path.is_dir() and path.resolve() != ours:

@@ -55,6 +55,7 @@ class SheetReader:
 
     def read(self, xml: bytes) -> dict[Cell, Content]:
         """Its cells."""
+        # Element by element: a tree of a whole sheet takes many times its memory.
         parser = expat.ParserCreate()
         parser.StartElementHandler, parser.EndElementHandler = self._start, self._end
         parser.CharacterDataHandler = self._hear
@@ -107,6 +108,7 @@ class SheetReader:
 
     def _read_formula(self, text: str) -> Formula | None:
         kind = self._attributes.get("t", "normal")
+        # Excel writes a filled-down formula once, in its first cell; the others have its number.
         if kind == "shared":
             number = self._attributes.get("si", "")
             if text:

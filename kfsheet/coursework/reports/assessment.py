@@ -1,19 +1,32 @@
-"""One submission, from file to marks, in a process that may be stopped at any moment."""
+"""One submission, from top to bottom: file, cells, answers, meaning, marks, a marked copy.
+
+=========  =====================================================================================
+file       :mod:`kfsheet.coursework.reading.submission` reads it within limits
+cells      :mod:`kfsheet.coursework.reading.worksheet` keeps formulas, numbers and texts
+answers    :mod:`kfsheet.coursework.reading.cell_addresses` finds where they stand
+meaning    :mod:`kfsheet.coursework.judging.formula_meaning` makes each a SymPy expression
+mark       :mod:`kfsheet.coursework.judging.judge` compares it with the key, and names the mistake
+report     :mod:`kfsheet.coursework.reports.marked_workbook` writes the marks beside the answers
+=========  =====================================================================================
+
+It runs in a process that may be stopped at any moment.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from kfsheet.coursework.handout import course_secret
-from kfsheet.coursework.handout.handouts import TOKEN_PROPERTY
+from kfsheet.coursework.handout.lock import TOKEN_PROPERTY
 from kfsheet.coursework.handout.own_numbers import own_numbers
 from kfsheet.coursework.judging.changed_cells import changed_cells
 from kfsheet.coursework.judging.diagnosis import EMPTY
 from kfsheet.coursework.judging.judge import Judge, Mark
-from kfsheet.coursework.judging.random_samples import Sampler
+from kfsheet.coursework.judging.random_samples import OwnNumbers, Sampler
 from kfsheet.coursework.judging.recalculated_answers import Recalculation
 from kfsheet.coursework.reading.cell_addresses import named_cell
 from kfsheet.coursework.reading.submission import Book, read_submission
@@ -81,14 +94,23 @@ def assess(spec: str, secret: bytes, path: Path, copy: Path | None = None) -> As
     try:
         book = read_submission(path)
         student = _student(book, exercise, secret)
-        return _assessed(exercise, sampler, secret, path, book, student, copy)
+        own = own_numbers(exercise, secret, student)
+        recalculation = Recalculation(path, sampler)
+        judge = Judge(exercise, sampler, book, own, recalculation)
+        marks = judge.marks()
+        if all(mark.status == EMPTY for mark in marks):
+            return Assessment(UNTOUCHED, "no answer was filled in", student, marks)
+        remarks = "; ".join(_remarks(exercise, judge, own, recalculation.late))
+        feedback = bool(copy) and _write_copy(path, copy, judge, marks)
+        return Assessment(GRADED, remarks, student, marks, feedback, final=not recalculation.late)
     except SubmissionError as error:
         return Assessment(error.status, error.remark)
-    except MemoryError:
+    except MemoryError:  # the limit of the process, see worker_pool
         return Assessment("too large", "reading the file took more memory than a submission may")
 
 
 def _student(book: Book, exercise: Exercise, secret: bytes) -> str:
+    # Two places hold it: what loses one, a program or a copied sheet, mostly keeps the other.
     address = named_cell(book, TOKEN_NAME)
     cell = book.sheets[address[0]].get(address[1:]) if address else None
     found = [
@@ -106,41 +128,19 @@ def _student(book: Book, exercise: Exercise, secret: bytes) -> str:
     return student
 
 
-def _assessed(
-    exercise: Exercise,
-    sampler: Sampler,
-    secret: bytes,
-    path: Path,
-    book: Book,
-    student: str,
-    copy: Path | None,
-) -> Assessment:
-    own = own_numbers(exercise, secret, student)
-    recalculation = Recalculation(path, sampler)
-
-    def asked(name: str) -> dict[int, bool]:
-        return recalculation(judge.addresses, name)
-
-    judge = Judge(exercise, sampler, book, own, asked)
-    marks = judge.marks()
-    if all(mark.status == EMPTY for mark in marks):
-        return Assessment(UNTOUCHED, "no answer was filled in", student, marks)
-    remarks = list(book.remarks)
-    if changed := changed_cells(exercise, book, judge.addresses, own):
-        remarks.append(f"locked cells were changed ({', '.join(changed[:6])}); marks ignore that")
-    if recalculation.late:
-        remarks.append("there was no time to calculate all answers; grade again to try once more")
-    final = not recalculation.late
-    result = Assessment(GRADED, "; ".join(remarks), student, marks, final=final)
-    if copy:
-        result.feedback = _write_copy(path, copy, judge, result)
-    return result
+def _remarks(exercise: Exercise, judge: Judge, own: OwnNumbers, late: bool) -> Iterator[str]:
+    """What a lecturer should know of the file; no mark depends on it."""
+    yield from judge.book.remarks
+    if changed := changed_cells(exercise, judge.book, judge.addresses, own):
+        yield f"locked cells were changed ({', '.join(changed[:6])}); marks ignore that"
+    if late:
+        yield "there was no time to calculate all answers; grade again to try once more"
 
 
-def _write_copy(path: Path, copy: Path, judge: Judge, result: Assessment) -> bool:
+def _write_copy(path: Path, copy: Path, judge: Judge, marks: list[Mark]) -> bool:
     """The student's own workbook with marks; a file too odd for that goes without."""
     try:
-        write_file(copy, mark_workbook(path, judge.book, judge.addresses, result.marks))
+        write_file(copy, mark_workbook(path, judge.book, judge.addresses, marks))
     except (KfsheetError, ValueError, KeyError):
         return False
     return True

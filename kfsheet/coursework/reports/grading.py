@@ -177,7 +177,7 @@ def _judged(
     known = {key: found for key in keys.values() if (found := _kept(work, key))}
     new = {key: path for path, key in keys.items() if key not in known}
     tasks = [(spec, secret, path, work / f"{key}.xlsx") for key, path in new.items()]
-    names = {path: key for key, path in new.items()}
+    names = {path: key for key, path in new.items()}  # equal files are judged once
     judged = ((path, _assessment(found)) for (_, _, path, _), found in run(tasks))
     for path, found in progress(judged, len(tasks)):
         known[names[path]] = found

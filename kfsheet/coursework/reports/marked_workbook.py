@@ -54,29 +54,32 @@ def mark_workbook(
     """
     result = BytesIO()
     with zipfile.ZipFile(path) as old, zipfile.ZipFile(result, "w", zipfile.ZIP_DEFLATED) as new:
-        styles, numbers = _styles(old.read("xl/styles.xml").decode())
-        changed = {
-            "xl/styles.xml": styles,
-            "xl/workbook.xml": _with_sheet(old.read("xl/workbook.xml").decode(), book.sheets),
-            "xl/_rels/workbook.xml.rels": _before(
-                old.read("xl/_rels/workbook.xml.rels").decode(),
-                "</Relationships>",
-                f'<Relationship Id="{RELATION}" Type="{SHEET_KIND}" Target="/{PART}"/>',
-            ),
-            "[Content_Types].xml": _before(
-                old.read("[Content_Types].xml").decode(),
-                "</Types>",
-                f'<Override PartName="/{PART}" ContentType="{CONTENT}"/>',
-            ),
-        }
+        styles, numbers = _styles(_text(old, "xl/styles.xml"))
+        changed = {"xl/styles.xml": styles, **_with_marks_sheet(old, book)}
         for sheet, cells in _headings(addresses, marks).items():
             part = book.parts[sheet]
-            changed[part] = _with_words(old.read(part).decode(), cells, numbers)
+            changed[part] = _with_words(_text(old, part), cells, numbers)
         for item in old.infolist():
             content = changed.get(item.filename)
             new.writestr(item.filename, old.read(item) if content is None else content.encode())
         new.writestr(PART, _sheet(marks, numbers, total))
     return result.getvalue()
+
+
+def _text(archive: zipfile.ZipFile, part: str) -> str:
+    return archive.read(part).decode()
+
+
+def _with_marks_sheet(old: zipfile.ZipFile, book: Book) -> dict[str, str]:
+    """The three parts that say of a new worksheet: that it is there, where, and what it is."""
+    links, kinds = "xl/_rels/workbook.xml.rels", "[Content_Types].xml"
+    link = f'<Relationship Id="{RELATION}" Type="{SHEET_KIND}" Target="/{PART}"/>'
+    kind = f'<Override PartName="/{PART}" ContentType="{CONTENT}"/>'
+    return {
+        "xl/workbook.xml": _with_sheet(_text(old, "xl/workbook.xml"), book.sheets),
+        links: _before(_text(old, links), "</Relationships>", link),
+        kinds: _before(_text(old, kinds), "</Types>", kind),
+    }
 
 
 def _before(xml: str, end: str, more: str) -> str:

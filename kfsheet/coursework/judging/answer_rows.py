@@ -1,0 +1,90 @@
+"""Words about rows and references of an answer: where it is right, where not, and what is there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+from openpyxl.utils import get_column_letter
+from sympy import Basic
+
+from kfsheet.coursework.judging.formula_meaning import parsed
+from kfsheet.coursework.reading.cell_addresses import CellAddresses
+from kfsheet.coursework.reading.submission import Book
+from kfsheet.coursework.reading.worksheet import Content, Formula
+from kfsheet.errors import FormulaError
+from kfsheet.parsing.references import Address, Reference
+
+
+@dataclass(frozen=True)
+class AnswerCell:
+    """One row of an answer: what was found there."""
+
+    step: int
+    address: Address
+    status: str
+    expression: Basic | None = None
+    fixed: tuple[int, ...] = ()
+    words: str = ""
+
+
+def content_of(book: Book, cell: AnswerCell) -> Content | None:
+    """What stands in the cell."""
+    return book.sheets[cell.address[0]].get(cell.address[1:])
+
+
+def not_in(book: Book, rest: list[AnswerCell], right: list[AnswerCell]) -> str:
+    """Rows that are not right, and what the first of them reads that the right ones do not."""
+    first, content = rest[0], content_of(book, rest[0])
+    words = f"not in {rows_of(rest)}"
+    if not isinstance(content, Formula):
+        return words
+    known = set(parsed(content_of(book, right[-1]))[1])
+    try:
+        strange = [r for r in parsed(content)[1] if r not in known]
+    except FormulaError:
+        return words
+    names = ", ".join(dict.fromkeys(shown(r, first.address[1:]) for r in strange))
+    return f"{words} (row {first.address[1]} refers to {names})" if names else words
+
+
+def fixed_row(book: Book, addresses: CellAddresses, cell: AnswerCell) -> str:
+    """The cells of the tables to which a formula refers with a fixed row, such as D$5."""
+    sheet, *host = cell.address
+    found = []
+    for reference in parsed(content_of(book, cell))[1]:
+        if reference.first and reference.first.row_fixed:
+            _, column = reference.first.at(tuple(host))
+            place = (reference.sheet or sheet, reference.first.row, column)
+            if isinstance(addresses.role(place), tuple):
+                found.append(shown(reference, tuple(host)))
+    return ", ".join(dict.fromkeys(found)) or "a fixed row"
+
+
+def rows_of(cells: list[AnswerCell]) -> str:
+    """Rows of a sheet in words: "rows 6-13, 15"."""
+    numbers = sorted(cell.address[1] for cell in cells)
+    runs: list[list[int]] = [[numbers[0]]]
+    for before, now in pairwise(numbers):
+        if now == before + 1:
+            runs[-1].append(now)
+        else:
+            runs.append([now])
+    runs_shown = [f"{run[0]}-{run[-1]}" if len(run) > 1 else str(run[0]) for run in runs]
+    more = ", ..." if len(runs_shown) > 5 else ""
+    return f"row{'s' * (len(numbers) > 1)} {', '.join(runs_shown[:5])}{more}"
+
+
+def shown(reference: Reference, host: tuple[int, int]) -> str:
+    """A reference as the student typed it."""
+    if reference.name:
+        return reference.name
+    ends = []
+    for corner in filter(None, (reference.first, reference.last)):
+        row, column = corner.at(host)
+        if row < 1 or column < 1:
+            return "a cell outside the sheet"
+        ends.append(
+            f"{'$' * corner.column_fixed}{get_column_letter(column)}{'$' * corner.row_fixed}{row}"
+        )
+    return (f"{reference.sheet}!" if reference.sheet else "") + ":".join(ends)
