@@ -36,11 +36,11 @@ class OpenedWorkbook:
     """A workbook as it stands: its names and formula cells, and the values an engine finds."""
 
     def __init__(
-        self, path: str | Path, engine: str = "ironcalc", asked: Engine | None = None
+        self, path: str | Path, engine: str = "ironcalc", started: Engine | None = None
     ) -> None:
-        """``asked`` is the engine, if it was asked about the file before."""
+        """``started`` is the engine, if it was asked about the file before."""
         self.path, self.engine_name = Path(path), engine
-        self.engine = asked or start_engine(path, engine)
+        self.engine = started or start_engine(path, engine)
         self.package = Package(path)
         self._among: dict[tuple[range, str, int], set[int]] = {}
 
