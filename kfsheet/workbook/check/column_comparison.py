@@ -25,7 +25,7 @@ class ColumnComparison:
             self.formulas = len(self._places) - filled.rules.count(None)
             self._numbers = np.array(filled.values, dtype=float)
             self._none = np.isnan(self._numbers)
-            size = np.fmax(np.abs(self._numbers), filled.scale)
+            size = np.fmax(np.abs(self._numbers), filled.scale)  # fmax: NaN gives way
             self._size = np.where(size > 0, size, 1.0)
 
     def largest(self, cells: SheetValues) -> float | None:

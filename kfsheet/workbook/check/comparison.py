@@ -68,7 +68,7 @@ class Comparison:
                 if not self._agrees_as_a_whole(sheet, column):
                     for row in filled.rows:
                         self._compare_cell((sheet.title, row, column), filled.cell(row))
-        if self.differing:
+        if self.differing:  # costly in a large workbook, and seldom needed
             self._find_culprits()
 
     def _expected_column(self, sheet: Sheet, at: int) -> ColumnComparison | None:
@@ -76,6 +76,7 @@ class Comparison:
         key = sheet.title, at
         if key not in self._columns:
             filled = sheet.columns[at]
+            # A start without a value is an empty cell among formulas.
             hollow = {filled.first + n for n, rule in enumerate(filled.rules) if rule is None}
             formulas = self._book.formulas_among(filled.rows, sheet.title, at)
             there = not filled.rules or formulas == set(filled.rows) - hollow
