@@ -15,10 +15,9 @@ from kfsheet.errors import KfsheetError, ModelError, WorkbookError
 
 if TYPE_CHECKING:
     from kfsheet.model.exercise import Exercise
-    from kfsheet.workbook.check.check_workbook import Report
 
 MOST_LINES = 20
-ENGINE_NAMES = {"ironcalc": "IronCalc", "libreoffice": "LibreOffice"}
+ENGINE_NAMES = ("ironcalc", "libreoffice")
 
 
 class Parser(argparse.ArgumentParser):
@@ -57,7 +56,7 @@ def parser() -> Parser:
     check.add_argument("workbooks", nargs="+", metavar="WORKBOOK", help="an .xlsx file")
     check.add_argument(
         "--engine",
-        choices=list(ENGINE_NAMES),
+        choices=ENGINE_NAMES,
         default="ironcalc",
         help="who recalculates (default: ironcalc, which is built in)",
     )
@@ -120,54 +119,29 @@ def run_check(arguments: argparse.Namespace) -> int:
 
 
 def _check_one(path: Path, arguments: argparse.Namespace) -> int:
-    from kfsheet.workbook.engines.ironcalc_process import IronCalcProcess
+    from kfsheet.workbook.engines.recalculate import start_engine
 
-    asked = IronCalcProcess(path) if arguments.engine == "ironcalc" else None
-    if asked:
-        asked.ask()  # it works while SymPy is imported
+    # It loads and calculates the workbook while SymPy is imported, which takes as long.
+    started = start_engine(path, arguments.engine)
     from kfsheet.exercises import exercise_names, load_exercise
-    from kfsheet.workbook.check.check_workbook import check
-    from kfsheet.workbook.check.opened_workbook import OpenedWorkbook
-    from kfsheet.workbook.check.trials import foreseen
+    from kfsheet.workbook.check.check_workbook import check_workbook
 
-    book = OpenedWorkbook(path, arguments.engine, asked)
-    given = arguments.exercise
-    likely = given or book.exercise_hint
-    # Both take time, in which the engine works.
-    exercise = load_exercise(likely) if given or likely in exercise_names() else None
-    ahead = foreseen(book, exercise) if exercise else None
-    name = book.exercise_name()
-    if not given and name not in exercise_names():
+    def ours(name: str) -> Exercise:
+        if name in exercise_names():
+            return load_exercise(name)
         raise ModelError(
             f"{path} was built from {name!r}, which is not one of ours; "
             f"name its file: kfsheet check {path} --exercise {name}.py"
         )
-    if exercise is None or (exercise.name != name and not given):
-        exercise, ahead = load_exercise(name), None
-    if exercise.name != name:
-        raise ModelError(f"{path} was built from {name!r}, not from {exercise.name!r}")
-    report = check(book, exercise, ahead or foreseen(book, exercise))
-    for change in report.changed:
-        print(f"{path}: changed: {change}")
-    lines = report.lines()
-    for line in lines[:MOST_LINES]:
+
+    exercise = load_exercise(arguments.exercise) if arguments.exercise else ours
+    report = check_workbook(path, exercise, arguments.engine, started=started)
+    lines = [f"changed: {change}" for change in report.changed] + report.lines()[:MOST_LINES]
+    if (more := len(report.lines()) - MOST_LINES) > 0:
+        lines.append(f"... and {more} more lines like these")
+    for line in (*lines, report.verdict):
         print(f"{path}: {line}")
-    if len(lines) > MOST_LINES:
-        print(f"{path}: ... and {len(lines) - MOST_LINES} more lines like these")
-    print(f"{path}: {_verdict(report)}")
     return HOLDS if report.holds else DOES_NOT_HOLD
-
-
-def _verdict(report: Report) -> str:
-    engine = ENGINE_NAMES[report.engine]
-    if report.holds:
-        return (
-            f"{report.cells} formulas agree with NumPy in {engine} "
-            f"(largest relative difference {report.largest:.1e})"
-        )
-    wrong = len(report.problems)
-    cells = f"{wrong} cell{'s are' if wrong > 1 else ' is'} wrong in {engine}"
-    return cells + (f", {report.followers} more follow from that" if report.followers else "")
 
 
 def run_show(arguments: argparse.Namespace) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import repeat
 from typing import Any
 
 import numpy as np
@@ -19,17 +18,17 @@ class ColumnComparison:
 
     def __init__(self, filled: FilledColumn, at: int, tolerance: float) -> None:
         self._filled, self._tolerance = filled, tolerance
-        self._places = list(zip(filled.rows, repeat(at), strict=False))
-        self.count = 0
-        """Formulas."""
+        self._places = [(row, at) for row in filled.rows]
+        self.formulas = 0
+        """How many there are."""
         if filled.rules:
-            self.count = len(self._places) - filled.rules.count(None)
+            self.formulas = len(self._places) - filled.rules.count(None)
             self._numbers = np.array(filled.values, dtype=float)
             self._none = np.isnan(self._numbers)
-            size = np.fmax(np.abs(self._numbers), filled.scale)
+            size = np.fmax(np.abs(self._numbers), filled.scale)  # fmax: NaN gives way
             self._size = np.where(size > 0, size, 1.0)
 
-    def distance(self, cells: SheetValues) -> float | None:
+    def largest(self, cells: SheetValues) -> float | None:
         """Largest relative difference from the values of a sheet; None if a cell disagrees."""
         found = list(map(cells.get, self._places))
         if not self._filled.rules:

@@ -37,6 +37,7 @@ def built_from(book: OpenedWorkbook, inputs: Inputs, default: Run, now: Run) -> 
     built from other data; those are gone, and the frozen figures are taken as they stand.
     """
     layout, frozen = inputs.layout, frozen_figures(book)
+    # From the likeliest to what costs another run of the model; the first that fits is taken.
     best, fewest = default, _contradictions(layout, default, frozen)
     for candidate in _others(inputs, now, frozen):
         if not fewest:

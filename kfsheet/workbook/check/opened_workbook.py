@@ -36,11 +36,11 @@ class OpenedWorkbook:
     """A workbook as it stands: its names and formula cells, and the values an engine finds."""
 
     def __init__(
-        self, path: str | Path, engine: str = "ironcalc", asked: Engine | None = None
+        self, path: str | Path, engine: str = "ironcalc", started: Engine | None = None
     ) -> None:
-        """``asked`` is the engine, if it was asked about the file before."""
+        """``started`` is the engine, if it was asked about the file before."""
         self.path, self.engine_name = Path(path), engine
-        self.engine = asked or start_engine(path, engine)
+        self.engine = started or start_engine(path, engine)
         self.package = Package(path)
         self._among: dict[tuple[range, str, int], set[int]] = {}
 
@@ -131,6 +131,7 @@ def layout_of(book: OpenedWorkbook, exercise: Exercise) -> Layout:
         if address is None:
             raise WorkbookError(f"{path}: no cell is named {name}; build the workbook anew")
         sheet, row, column = address
+        # A name that was moved to another parameter's cell would compute, and mean another thing.
         if column == 1 or book.value((sheet, row, column - 1)) != name:
             raise WorkbookError(
                 f"{path}: the name {name} leads to {place(address)}, which is not labelled {name}; "
@@ -216,6 +217,7 @@ def inputs_in(book: OpenedWorkbook, layout: Layout) -> Inputs:
 
 def _series(book: OpenedWorkbook, column: Column, cells: list[Address]) -> list[float | None]:
     sheet, row, number = cells[-1]
+    # Somebody added a row; it would be left out without a word.
     if book.value((sheet, row + 1, number)) is not None:
         raise WorkbookError(
             f"{book.path}: {place((sheet, row + 1, number))} lies below the table; "

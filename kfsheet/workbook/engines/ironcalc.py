@@ -72,6 +72,7 @@ class IronCalc:
         if unknown := [sheet for sheet in changes or {} if sheet not in self._titles]:
             raise EngineError(f"{self._path} has no worksheet {unknown[0]!r} to put numbers in")
         with _one_line(f"IronCalc cannot put numbers into {self._path}"):
+            # The last question's numbers would be part of this one's answer.
             self._restore()
             for sheet, cells in (changes or {}).items():
                 number = self._titles.index(sheet)
@@ -87,6 +88,7 @@ class IronCalc:
         places = self._model.get_all_cells()
         if places != self._places:
             self._places = places
+            # The cells of a sheet together; within one, the order of IronCalc will do.
             self._sorted = sorted(places, key=itemgetter(0))
             self._cells = {title: [] for title in self._titles}
             for sheet, those in groupby(self._sorted, itemgetter(0)):

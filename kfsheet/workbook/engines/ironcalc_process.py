@@ -51,7 +51,7 @@ class IronCalcProcess:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
-            start_new_session=True,
+            start_new_session=True,  # so that its forks can be stopped with it
         )
         weakref.finalize(self, _end, self._process, folder)
         self._shared = _SharedFolder(Path(folder))
@@ -78,6 +78,7 @@ class IronCalcProcess:
     def values(self, changes: Changes | None = None) -> Values:
         """Values of all cells that are not empty; what was asked for in vain is passed over."""
         number = self._ask(changes)
+        # Answers come in the order of the questions: an earlier one that nobody wants comes first.
         while self._answered < number:
             self._answered = self._next()
         self._asked = {question: n for question, n in self._asked.items() if n > number}
@@ -90,7 +91,7 @@ class IronCalcProcess:
     def _next(self) -> int:
         """Wait for an answer; its number."""
         limit = Timer(TIMEOUT, kill, [self._process])
-        limit.daemon = True
+        limit.daemon = True  # the interpreter would wait for it when it is interrupted
         limit.start()
         try:
             number = self._process.stdout.readline()
@@ -260,7 +261,7 @@ class _Fork:
             os.close(pipe.fileno())
             work()
         except BaseException:
-            os._exit(1)
+            os._exit(1)  # never return into the copy of the server's loop that a fork is
         os._exit(0)
 
     def wait(self) -> None:

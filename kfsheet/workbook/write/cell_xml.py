@@ -61,6 +61,7 @@ class _Column:
         """First cell of each rule that is shared, by row, and what the other cells hold."""
         self._shared: dict[int, str] = {}
         for number, rule in enumerate(filled.rules):
+            # Each start has a rule of one row; the last rule fills what remains.
             last = filled.rows[-1] if number == len(filled.rules) - 1 else filled.first + number
             rows = range(filled.first + number, last + 1)
             rows = [row for row in rows if (row, at) not in sheet.cells]
@@ -89,7 +90,7 @@ _letter = lru_cache(maxsize=20_000)(get_column_letter)
 def _moves(rule: Formula, letter: str, row: int, other: int) -> bool:
     """Whether the formula in ``other`` is the one in ``row``, filled down, on its own sheet."""
     text = rule(row)
-    if "!" in text:
+    if "!" in text:  # Excel shares no formula that refers to another worksheet
         return False
     return Translator(text, f"{letter}{row}").translate_formula(f"{letter}{other}") == rule(other)
 
@@ -107,6 +108,7 @@ def _plain(address: str, style: int, content: float | int | str | None) -> str:
     if content is None:
         return f"{head}/>"
     if isinstance(content, str):
+        # In the cell itself: openpyxl has saved the table of shared strings without our cells.
         kept = ' xml:space="preserve"' if content != content.strip() else ""
         return f'{head} t="inlineStr"><is><t{kept}>{escape(content)}</t></is></c>'
     kind, value = typed(content)
@@ -116,7 +118,7 @@ def _plain(address: str, style: int, content: float | int | str | None) -> str:
 def typed(value: float | int | str | bool | None) -> tuple[str, str]:
     """Type attribute and text of a value; numbers with all their digits."""
     if isinstance(value, float):
-        return "", repr(float(value))
+        return "", repr(float(value))  # NumPy's own repr is "np.float64(...)"
     if isinstance(value, bool):
         return ' t="b"', str(int(value))
     if isinstance(value, str):

@@ -52,6 +52,7 @@ class Probe:
 def probes(layout: Layout, now: Run, built: Run) -> list[Probe]:
     """Every line of the table: parameters, then data, then results."""
     lines = [p for p in _all_probes(layout, now, built) if isfinite(p.built)]
+    # The formulas of the verdict count over one range for each kind.
     return sorted(lines, key=lambda p: KINDS.index(p.what))
 
 
@@ -84,7 +85,7 @@ def _column_probes(layout: Layout, column: Column, now: Run, built: Run) -> Iter
     )
     for (quantity, function), formula in zip(FIGURES.items(), formulas, strict=True):
         if function is _weighted and layout.model.rows == 1:
-            continue
+            continue  # the only weight is 0
         now_value, built_value = now.figure(function, name), built.figure(function, name)
         yield Probe(name, what, quantity, formula, now_value, built_value, scale)
 
@@ -147,7 +148,9 @@ def _put_verdict(sheet: Sheet, lines: list[Probe]) -> None:
         first = last_row + 1
     largest = _largest([p.difference for p in lines if p.what == "result"])
     changed = {
-        kind: sum(not p.difference <= TOLERANCE for p in lines if p.what == kind) for kind in KINDS
+        # "not <=" and never ">": NaN, a figure that has become an error, is a change too.
+        kind: sum(not p.difference <= TOLERANCE for p in lines if p.what == kind)
+        for kind in KINDS
     }
     figures = [
         ("verdict", verdict_formula(), verdict(changed, largest)),

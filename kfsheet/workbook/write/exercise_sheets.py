@@ -68,7 +68,7 @@ def _formula_column(sheet: Sheet, layout: Layout, column: Column, at: int, now: 
     values = now.columns[column.name]
     shape, size = number_format(values), now.figure(rms, column.name)
     kind = "formula"
-    if column is layout.model.clock:
+    if column is layout.model.clock:  # grey, as the step index beside it
         kind, shape = "index", "0.0##"
     # A start without a value is an empty cell, not a formula that says so.
     rules = tuple(None if r is Missing else layout.formula(r, sheet.title) for r in column.rules)
@@ -94,6 +94,7 @@ def parameters_sheet(layout: Layout, now: Run) -> Sheet:
         _, row, column = layout.scalars[name]
         value = now.scalars[name]
         text = layout.formula(scalar.expression, sheet.title)(row)
+        # A mean may be small because its terms cancel; it is as exact as the columns it reads.
         sizes = [now.figure(rms, c) for c in columns_read(scalar.expression)]
         cell = Cell(
             text, "formula", stored_value(value), number_format([value]), "", max(sizes, default=0)
@@ -129,6 +130,7 @@ def helper_columns(exercise: Exercise) -> list[tuple[str, str]]:
     found = {}
     for chart in exercise.charts:
         for name in (n for s in chart.series for n in (s.x, s.y)):
+            # A start that is Missing is an empty cell, which a chart leaves out anyway.
             rules = exercise.model.column(name).rules
             if any(r is not Missing and r.has(Missing) for r in rules):
                 found[name, ""] = None
@@ -164,7 +166,7 @@ def _plotted(layout: Layout, name: str, where: str, now: Run) -> FilledColumn:
     def rule(row: int) -> str:
         asked = f"ISNUMBER({cells}{row})"
         asked = f"AND({asked},{mask}{row}<>0)" if where else asked
-        return f"=IF({asked},{cells}{row},NA())"
+        return f"=IF({asked},{cells}{row},NA())"  # a chart leaves #N/A out; "" it draws as 0
 
     values = now.columns[name]
     if where:

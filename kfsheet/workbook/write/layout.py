@@ -65,7 +65,7 @@ class Layout:
         for name in model.parameters:
             scalars[name] = ("Parameters", row, 2)
             row += 1
-        row += 3
+        row += 3  # an empty one, the heading and the header of the next table
         for name in model.derived_scalars:
             scalars[name] = ("Parameters", row, 2)
             row += 1
@@ -86,6 +86,7 @@ class Layout:
         """Absolute reference to all rows of a column, ``'Free run'!$C$4:$C$19``."""
         home, column = (sheet, self.columns[sheet][name]) if sheet else self.home(name)
         letter = get_column_letter(column)
+        # With the sheet even on its own sheet: the same text then serves in every formula.
         return f"{quote(home)}!${letter}${FIRST_ROW}:${letter}${self.last_row}"
 
     def last(self, name: str, cell: str) -> str:
@@ -113,6 +114,7 @@ class Layout:
         if key not in self._templates:
             names = _Names(self, sheet)
             template = "=" + excel_code(expression, names)
+            # The last row has the longest numbers.
             if len(template.format(*repeat(self.last_row, names.depth + 1))) > HARD_LIMIT:
                 raise PrintError(f"a formula on {sheet} is longer than {HARD_LIMIT}: {template}")
             self._templates[key] = template, names.depth
@@ -127,6 +129,7 @@ class _Names:
 
     def __call__(self, node: Basic) -> str | None:
         if node == t:
+            # The column stays when a formula is copied to the right: a step is a step there too.
             return f"${get_column_letter(self.layout.columns[self.sheet]['t'])}{{0}}"
         if isinstance(node, Symbol):
             return node.name

@@ -120,6 +120,7 @@ def _print_side_by_side(worksheet: Worksheet, sheet: Sheet) -> None:
 def _define_names(book: Workbook, layout: Layout, sheets: list[Sheet]) -> None:
     own = {name: (p.title, *cell) for p in sheets for name, cell in p.names.items()}
     for name, (sheet, row, column) in {**layout.scalars, **own}.items():
+        # Absolute, or a name would mean another cell wherever it is used.
         cell = f"{quote_sheetname(sheet)}!${get_column_letter(column)}${row}"
         book.defined_names[name] = DefinedName(name, attr_text=cell)
 
@@ -168,6 +169,7 @@ def _grey_rows(book: Workbook, layout: Layout, name: str) -> None:
     cell = f"{quote_sheetname(home)}!${get_column_letter(column)}{FIRST_ROW}"
     for section, columns in layout.columns.items():
         last = get_column_letter(max(columns.values()))
+        # Relative to the area's first row, as Excel reads rules: each row asks for its own cell.
         rule = FormulaRule(formula=[f"{cell}=0"], font=Font(color="FFBFBFBF"))
         area = f"A{FIRST_ROW}:{last}{layout.last_row}"
         book[section].conditional_formatting.add(area, rule)

@@ -44,6 +44,7 @@ def reproducible_zip(saved: bytes, cells: Mapping[str, str]) -> bytes:
                 content = MOMENT.sub(r"\g<1>2000-01-01T00:00:00Z\3", content.decode()).encode()
             elif name == "docProps/app.xml":
                 content = PROGRAM.sub(rb"\g<1>%s\2" % BY_US, content)
+            # A zip holds the hour of each part and the system that made it: none of them here.
             info = zipfile.ZipInfo(name, EPOCH)
             info.compress_type, info.create_system = zipfile.ZIP_DEFLATED, 0
             new.writestr(info, content)

@@ -64,6 +64,7 @@ class Styles:
 
     def _array(self, kind: str, number_format: str, align: str) -> object:
         background, colour, bold, size = KINDS[kind]
+        # openpyxl makes the array of a style only through a cell.
         model = Cell(self._scratch, row=1, column=1)
         model.font = Font(name="Calibri", size=size, bold=bold, color="FF" + colour)
         if background:
