@@ -1,8 +1,9 @@
 """Assignments for every student, and their grading.
 
-``handout`` makes the files, ``reading`` finds the answers in what comes back, ``judging`` says what
-each is worth, ``reports`` writes the tables; each imports from those before it in the order
-``reading | judging | handout | reports``. Nothing here may define an exercise. Begin with
+Here belongs what makes the files (``handout``), finds the answers in what comes back (``reading``),
+says what each is worth (``judging``) and writes the tables (``reports``); each imports from those
+before it in the order ``reading | judging | handout | reports``. Nothing here may define an
+exercise. Begin with
 :mod:`kfsheet.coursework.handout.handouts` and :mod:`kfsheet.coursework.reports.assessment`.
 """
 

@@ -9,9 +9,9 @@ import pytest
 import students as do
 
 from kfsheet import Draws, study
-from kfsheet.coursework.judging.worker_pool import run_on
 from kfsheet.coursework.reading.roster import Student
 from kfsheet.coursework.reports.grading import grade
+from kfsheet.coursework.worker_pool import run_on
 from kfsheet.errors import EngineError
 from kfsheet.evaluation.compiling import can_compile
 from kfsheet.exercises.football import exercise, football
@@ -52,7 +52,7 @@ def test_the_processes_are_others(cluster):
 
 def test_a_cluster_gives_the_marks_that_were_earned(cluster, monkeypatch, tmp_path):
     """Its workers judge in processes of their own, with limits, as grading does here."""
-    monkeypatch.setattr("kfsheet.coursework.judging.worker_pool.BATCH", 1)  # work for both
+    monkeypatch.setattr("kfsheet.coursework.worker_pool.BATCH", 1)  # work for both
     bob = Student("s002", "Bob")
     returned = tmp_path / "returned"
     returned.mkdir()

@@ -14,12 +14,12 @@ from students import ADA, SECRET, Paper
 
 from kfsheet import load_exercise
 from kfsheet.coursework.handout.handout_workbook import handout_bytes
-from kfsheet.coursework.judging.worker_pool import Failed, Pool
 from kfsheet.coursework.reading import submission
 from kfsheet.coursework.reading.submission import read_submission
 from kfsheet.coursework.reading.worksheet import Formula
 from kfsheet.coursework.reports.assessment import assess
 from kfsheet.coursework.reports.grading import STATUSES
+from kfsheet.coursework.worker_pool import Failed, Pool
 
 FUZZED = 2_000
 EXERCISE = load_exercise("football")

@@ -12,9 +12,9 @@ from typing import Any
 from kfsheet.coursework.handout import course_secret
 from kfsheet.coursework.handout.handout_workbook import handout_of_run, own_run, solution_of_run
 from kfsheet.coursework.handout.own_numbers import own_numbers
-from kfsheet.coursework.judging.worker_pool import Failed, Pool
 from kfsheet.coursework.reading.results_folder import belongs_to, claim
 from kfsheet.coursework.reading.roster import Student
+from kfsheet.coursework.worker_pool import Failed, Pool
 from kfsheet.errors import DataError, ModelError, WorkbookError
 from kfsheet.exercises import load_exercise
 from kfsheet.files import write_file

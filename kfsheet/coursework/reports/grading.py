@@ -14,10 +14,10 @@ from typing import Any
 import kfsheet
 from kfsheet.coursework.handout import course_secret
 from kfsheet.coursework.judging.judge import Mark
-from kfsheet.coursework.judging.worker_pool import SECONDS, Failed, Pool, run_on
 from kfsheet.coursework.reading.roster import Student
 from kfsheet.coursework.reading.submitted_files import owner, submitted_files
 from kfsheet.coursework.reports.assessment import GRADED, NO_TOKEN, OTHER, Assessment, assess
+from kfsheet.coursework.worker_pool import SECONDS, Failed, Pool, run_on
 from kfsheet.files import write_file
 from kfsheet.model.exercise import Exercise
 
