@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from kfsheet.model.exercise import Exercise
 
 MOST_LINES = 20
-ENGINE_NAMES = ("ironcalc", "libreoffice")
+ENGINE_NAMES = ("ironcalc", "libreoffice")  # said again: --help imports no engines
 
 
 class Parser(argparse.ArgumentParser):

@@ -178,7 +178,7 @@ class _Server:
                 continue
             if not self._fork(number, changes):
                 while self._forks:
-                    self._send_of_a_fork()
+                    self._forward()
                 self._answer(number, changes)
                 _send(self._pipe, number)
 
@@ -206,13 +206,14 @@ class _Server:
             while True:
                 ends = [fork.end for fork in self._forks]
                 if ends and self._source not in select([self._source, ends[0]], [], [])[0]:
-                    self._send_of_a_fork()
+                    self._forward()
                 elif line := self._source.readline():
                     yield int(line)
                 else:
                     return
 
-    def _send_of_a_fork(self) -> None:
+    def _forward(self) -> None:
+        """Say that the first of the forks has answered, once it has."""
         fork = self._forks.popleft()
         fork.wait()
         _send(self._pipe, fork.number)

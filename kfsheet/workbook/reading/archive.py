@@ -20,21 +20,16 @@ LINKS = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
 
 
 @contextmanager
-def refusing(path: str | Path) -> Iterator[None]:
-    """What a file that is no workbook raises, in one line."""
+def refusing(path: str | Path, *others: type[Exception]) -> Iterator[None]:
+    """What a file that is no workbook raises, in one line; ``others`` are what a reader adds."""
+    broken = (zipfile.BadZipFile, zipfile.LargeZipFile, zlib.error, EOFError, KeyError, ParseError)
     try:
         yield
     except OSError as error:
         raise WorkbookError(f"{path} cannot be read: {error.strerror or error}") from None
-    except (
-        zipfile.BadZipFile,
-        zipfile.LargeZipFile,
-        zlib.error,
-        EOFError,
-        KeyError,
-        ParseError,
-    ) as error:
-        raise WorkbookError(f"{path} is not a workbook (.xlsx): {error}") from None
+    except (*broken, *others) as error:
+        detail = (str(error).splitlines() or [type(error).__name__])[0]
+        raise WorkbookError(f"{path} is not a workbook (.xlsx): {detail}") from None
 
 
 def worksheet_parts(archive: zipfile.ZipFile) -> dict[str, str]:
