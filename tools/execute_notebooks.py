@@ -9,26 +9,33 @@ cell tagged ``interactive`` (a widget, with random names) keeps no output and is
 runs it.
 """
 
+from __future__ import annotations
+
 import os
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import jupytext
-import nbformat
 from made import ROOT, everything, is_made, note_made
-from nbclient import NotebookClient
 
 from kfsheet.files import write_file
+
+# Jupyter's packages take seconds to import: they are imported where a notebook is to be executed.
+if TYPE_CHECKING:
+    from nbformat import NotebookNode
 
 FOLDER = ROOT / "notebooks"
 AT_A_TIME = 2
 KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
 
 
-def unexecuted(source: Path) -> nbformat.NotebookNode:
+def unexecuted(source: Path) -> NotebookNode:
     """The notebook of a source, without outputs."""
+    import jupytext
+    import nbformat
+
     notebook = jupytext.read(source)
     for number, cell in enumerate(notebook.cells, 1):
         cell.id = f"cell-{number:02d}"
@@ -43,8 +50,10 @@ def unexecuted(source: Path) -> nbformat.NotebookNode:
     return notebook
 
 
-def executed(source: Path) -> nbformat.NotebookNode:
+def executed(source: Path) -> NotebookNode:
     """The notebook of a source, with outputs and nothing that another run would change."""
+    from nbclient import NotebookClient
+
     notebook = unexecuted(source)
     widgets = [c for c in notebook.cells if "interactive" in c.metadata.get("tags", [])]
     sources = [cell.source for cell in widgets]
@@ -67,10 +76,13 @@ def executed(source: Path) -> nbformat.NotebookNode:
     return notebook
 
 
-def timed(source: Path) -> tuple[nbformat.NotebookNode, float]:
-    """The executed notebook, and the seconds that it took."""
+def timed(source: Path) -> tuple[bytes, float]:
+    """The file of an executed notebook, and the seconds that it took."""
+    import nbformat
+
     begin = time.perf_counter()
-    return executed(source), time.perf_counter() - begin
+    text = nbformat.writes(executed(source)) + "\n"
+    return text.encode(), time.perf_counter() - begin
 
 
 def main(names: list[str]) -> None:
@@ -83,9 +95,8 @@ def main(names: list[str]) -> None:
         running = {pool.submit(timed, source): source for source in stale}
         for done in as_completed(running):
             source = running[done]
-            notebook, seconds = done.result()
-            text = nbformat.writes(notebook) + "\n"
-            write_file(source.with_suffix(".ipynb"), text.encode())
+            content, seconds = done.result()
+            write_file(source.with_suffix(".ipynb"), content)
             note_made(source.with_suffix(".ipynb"), [*package, source])
             print(f"    {source.stem}.ipynb: {seconds:.0f} s", flush=True)
     print(f"notebooks: {len(stale)} executed, {len(sources) - len(stale)} as they were")
