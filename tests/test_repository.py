@@ -20,6 +20,10 @@ from kfsheet.workbook.write.write_workbook import workbook_bytes
 
 ROOT = Path(__file__).parents[1]
 REGISTRY = r"pypi\.org|files\.pythonhosted"
+WRITTEN = (
+    *(".py", ".pyi", ".md", ".toml", ".txt", ".csv", ".yml", ".yaml", ".cff", ".ipynb"),
+    *("Makefile", "run"),
+)
 README = (ROOT / "README.md").read_text()
 
 
