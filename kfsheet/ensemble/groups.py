@@ -115,18 +115,20 @@ def run_batch(group: Group) -> GroupSums:
 
 def run_group(group: Group) -> GroupSums:
     """Run one group and keep what is asked for."""
-    data = dict(group.data)
-    if group.draws:
-        drawn = group.draws.block(group.first, group.last, group.rows)
-        data |= dict(zip(group.draws.columns, drawn, strict=True))
-    out, results = (_compiled if group.compiled else _by_arrays)(group, data)
+    out, results = columns_and_scalars(group)
     rows = [Sums.of(out[:, : group.statistics])] if group.statistics else []
     rows += [Sums.of(_nees(group, out, *places)[:, None]) for places in group.nees]
     whole = Sums.together(rows) if rows else Sums.of(out[:, :0])
     return GroupSums(group.members, whole, Sums.of(results), [results] if group.keep else [])
 
 
-# -- three ways to compute: columns (members, columns, rows) and scalars (members, scalars) -----
+def columns_and_scalars(group: Group) -> tuple[np.ndarray, np.ndarray]:
+    """What the members of a group compute: (members, columns, rows) and (members, scalars)."""
+    data = dict(group.data)
+    if group.draws:
+        drawn = group.draws.block(group.first, group.last, group.rows)
+        data |= dict(zip(group.draws.columns, drawn, strict=True))
+    return (_compiled if group.compiled else _by_arrays)(group, data)
 
 
 def _compiled(group: Group, data: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

@@ -134,20 +134,20 @@ def study(
     columns, scalars = checked_names("columns", columns or ()), checked_scalars(model, scalars)
     nees = checked_nees(model, nees or {})
     check_executor(executor)
-    everyone = _all_members(
+    group = everyone(
         model, members, data, columns, scalars, nees, parameters, compiled,
         travels=executor is not None, keep=bool(levels),
     )  # fmt: skip
-    with Kept(len(everyone.kernel.scalars)) as kept:
-        found = computed(everyone, executor, kept)
+    with Kept(len(group.kernel.scalars)) as kept:
+        found = computed(group, executor, kept)
         lines = kept.quantiles(levels)
     named = {
         f"{repr(q).removesuffix('.0')} quantile": x for q, x in zip(levels, lines, strict=True)
     }
-    return _tables(model, [*columns, *nees], everyone.kernel.scalars, found, named)
+    return _tables(model, [*columns, *nees], group.kernel.scalars, found, named)
 
 
-def _all_members(
+def everyone(
     model: Recurrence,
     members: int,
     data: Mapping[str, Any] | Draws | None,
@@ -157,8 +157,8 @@ def _all_members(
     parameters: Mapping[str, Any],
     compiled: bool | None,
     *,
-    travels: bool,
-    keep: bool,
+    travels: bool = False,
+    keep: bool = False,
 ) -> Group:
     """All members as one group, which is then cut into parts."""
     shared, own = parameters_of_members(model, parameters, members)
