@@ -16,7 +16,22 @@ from numpy import arcsinh as asinh
 from numpy import arctan as atan
 from numpy import arctan2 as atan2
 from numpy import arctanh as atanh
-from numpy import cos, cosh, exp, fabs, log, logical_not, power, sin, sinh, sqrt, tan, tanh, where
+from numpy import (
+    cos,
+    cosh,
+    exp,
+    fabs,
+    float64,
+    log,
+    logical_not,
+    power,
+    sin,
+    sinh,
+    sqrt,
+    tan,
+    tanh,
+    where,
+)
 
 
 def only(x, taken):

@@ -156,8 +156,8 @@ def _compiled(group: Group, data: dict[str, np.ndarray]) -> tuple[np.ndarray, np
 def _by_arrays(group: Group, data: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     out = np.empty((len(group.kernel.columns), group.rows, group.members))
     results = np.empty((len(group.kernel.scalars), group.members))
-    shared = enumerate(group.parameters.tolist())
-    parameters = [group.own_parameters.get(place, value) for place, value in shared]
+    # Numbers of NumPy, as Python's own overflow without an error.
+    parameters = [group.own_parameters.get(n, p) for n, p in enumerate(group.parameters)]
     # Row after row is read, so the members of a row lie beside each other.
     series = {n: a[0] if len(a) == 1 else np.ascontiguousarray(a.T) for n, a in data.items()}
     _fill(group, range(group.members), parameters, series, out, results)
