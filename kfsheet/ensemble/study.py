@@ -129,6 +129,17 @@ def study(
     DataError
         For an unknown name, a shape that does not fit, a value that is not allowed, or a member
         whose computation has no value; the message names the member.
+    EngineError
+        If it shall be compiled and Numba is not installed.
+
+    Examples
+    --------
+    The gain of the football is a b / (r + a^2 b), with a = 44.2 and b = 0.01; here r = 1 and 100.
+
+    >>> from kfsheet.exercises.football.model import football
+    >>> found = study(football, 2, scalars=["K_x"], r_i=[1, 100])
+    >>> found.scalars["mean"].round(5).tolist()
+    [0.01261]
     """
     members, levels = checked_members(members), checked_quantiles(quantiles)
     columns, scalars = checked_names("columns", columns or ()), checked_scalars(model, scalars)
