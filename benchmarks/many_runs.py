@@ -1,8 +1,12 @@
 """Ten thousand runs: kfsheet beside C, vectorised NumPy and simdkalman."""
 
+import os
+import subprocess
+import sys
 import tempfile
 from collections.abc import Iterator
 from importlib.util import find_spec
+from statistics import median
 
 import numpy as np
 from flights import ROWS, STATE, c_library, pointer
@@ -16,16 +20,51 @@ from kfsheet.exercises.football import football
 from kfsheet.exercises.shuttlecock import shuttlecock
 
 MEMBERS = 10_000
-STUDY = {"scalars": (), "compiled": can_compile()}
+COMPILER = can_compile()
+STUDY = {"scalars": (), "compiled": COMPILER}
 
 
 def lines() -> Iterator[Line]:
     """All cores on our side, statistics of every step over the members on both."""
+    yield from first_study()
     yield cannonballs()
     yield from drawn()
     yield footballs()
     if find_spec("simdkalman"):
         yield shuttlecocks()
+
+
+def first_study() -> Iterator[Line]:
+    """Two hundred cannon-balls with an empty cache, each time in a process of its own."""
+    ways = {"NumPy arrays": False, "by default": None, **({"compiled": True} if COMPILER else {})}
+    times = {}
+    for way, compiled in ways.items():
+        times[way] = seconds_alone(FIRST.format(compiled=compiled))
+        note = "1.5 times the arrays' at most" if compiled is None else ""
+        what = f"200 cannon-balls, fresh process, empty cache: {way}"
+        peer = times["NumPy arrays"] if compiled is None else 0.0
+        yield Line(what, times[way], peer, note)
+
+
+FIRST = """
+import time, kfsheet as kf
+from kfsheet.exercises.cannonball import cannonball
+start = time.perf_counter()
+kf.study(cannonball, 200, kf.Draws("n_theta", "n_r"), columns=["NIS"], compiled={compiled})
+print(time.perf_counter() - start)
+"""
+
+
+def seconds_alone(program: str, repeats: int = 3) -> float:
+    """Median of what a program prints, in processes that find no machine code."""
+    found = []
+    for _ in range(repeats):
+        with tempfile.TemporaryDirectory() as cache:
+            around = {**os.environ, "KFSHEET_CACHE": cache}
+            command = [sys.executable, "-c", program]
+            done = subprocess.run(command, env=around, capture_output=True, text=True, check=True)
+            found.append(float(done.stdout))
+    return median(found)
 
 
 def cannonballs() -> Line:

@@ -6,11 +6,30 @@ missing value (NaN) has to pass quietly, and what a branch does not take is made
 """
 
 from functools import reduce
-from math import nan
+from math import nan, pi
 
 import numpy as np
+from numpy import arccos as acos
+from numpy import arccosh as acosh
+from numpy import arcsin as asin
+from numpy import arcsinh as asinh
+from numpy import arctan as atan
+from numpy import arctan2 as atan2
+from numpy import arctanh as atanh
 from numpy import (
+    cos,
+    cosh,
+    exp,
+    fabs,
+    float64,
+    log,
+    logical_not,
+    power,
+    sin,
+    sinh,
     sqrt,
+    tan,
+    tanh,
     where,
 )
 

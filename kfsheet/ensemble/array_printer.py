@@ -34,13 +34,17 @@ class ArrayPrinter(PythonPrinter):
         self._taken = ""  # which members take the branch that is being printed; all without one
 
     def _print_Symbol(self, expr: Symbol) -> str:
-        return "float(t)" if expr == t else super()._print_Symbol(expr)
+        return "float64(t)" if expr == t else super()._print_Symbol(expr)
 
     def _print_Indexed(self, expr: Indexed) -> str:
         return self._cell(str(expr.base.label), int(lag(expr)))
 
     def _print_IndexedBase(self, expr: Basic) -> str:
         return self._whole(str(expr.label))
+
+    def value(self, expr: Expr) -> str:
+        """The value of a cell: NumPy's number, as Python's own overflows without an error."""
+        return f"float64({self._print(expr)})" if expr.is_number else self._print(expr)
 
     # -- what may have no value --------------------------------------------------------------
 

@@ -19,7 +19,7 @@ from sympy import Expr
 from kfsheet.ensemble import array_functions
 from kfsheet.ensemble.array_printer import ArrayPrinter
 from kfsheet.evaluation.row_loop import Kernel, RowLoop
-from kfsheet.model.expressions import Missing, column_references, lag
+from kfsheet.model.expressions import Missing
 from kfsheet.model.validation import scalars as scalars_in
 
 if TYPE_CHECKING:
@@ -111,21 +111,12 @@ class ArraySource(RowLoop):
         yield f"{indent}{name} = {text}"
 
     def _tests(self, columns: Sequence[Column], row: int, in_loop: bool) -> str:
-        """What is infinite was an error before; left to find is what NaN has passed into."""
+        """Left to find is what NaN passes into: a summary of nothing, which no model guards."""
+        summaries = set(self.model.summaries)
+        rules = {c.name: c.definition(row) for c in columns}
         unsure = [
-            c.name
-            for c in columns
-            if not (rule := c.definition(row)).has(Missing) and self._may_read_gap(rule, row)
+            name
+            for name, rule in rules.items()
+            if not rule.has(Missing) and summaries & {s.name for s in scalars_in(rule)}
         ]
         return f"0*({' + '.join(unsure)})" if unsure else ""
-
-    def _may_read_gap(self, rule: Expr, row: int) -> bool:
-        """Whether a rule that holds in a row, or from it on, may read a missing value."""
-        if {s.name for s in scalars_in(rule)} & set(self.model.summaries):
-            return True
-        return any(
-            self.model.column(str(cell.base.label)).gap_possible(
-                range(row - int(lag(cell)), self.model.rows)
-            )
-            for cell in column_references(rule)
-        )

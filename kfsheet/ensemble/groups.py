@@ -115,18 +115,20 @@ def run_batch(group: Group) -> GroupSums:
 
 def run_group(group: Group) -> GroupSums:
     """Run one group and keep what is asked for."""
-    data = dict(group.data)
-    if group.draws:
-        drawn = group.draws.block(group.first, group.last, group.rows)
-        data |= dict(zip(group.draws.columns, drawn, strict=True))
-    out, results = (_compiled if group.compiled else _by_arrays)(group, data)
+    out, results = columns_and_scalars(group)
     rows = [Sums.of(out[:, : group.statistics])] if group.statistics else []
     rows += [Sums.of(_nees(group, out, *places)[:, None]) for places in group.nees]
     whole = Sums.together(rows) if rows else Sums.of(out[:, :0])
     return GroupSums(group.members, whole, Sums.of(results), [results] if group.keep else [])
 
 
-# -- three ways to compute: columns (members, columns, rows) and scalars (members, scalars) -----
+def columns_and_scalars(group: Group) -> tuple[np.ndarray, np.ndarray]:
+    """What the members of a group compute: (members, columns, rows) and (members, scalars)."""
+    data = dict(group.data)
+    if group.draws:
+        drawn = group.draws.block(group.first, group.last, group.rows)
+        data |= dict(zip(group.draws.columns, drawn, strict=True))
+    return (_compiled if group.compiled else _by_arrays)(group, data)
 
 
 def _compiled(group: Group, data: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -154,8 +156,8 @@ def _compiled(group: Group, data: dict[str, np.ndarray]) -> tuple[np.ndarray, np
 def _by_arrays(group: Group, data: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     out = np.empty((len(group.kernel.columns), group.rows, group.members))
     results = np.empty((len(group.kernel.scalars), group.members))
-    shared = enumerate(group.parameters.tolist())
-    parameters = [group.own_parameters.get(place, value) for place, value in shared]
+    # Numbers of NumPy, as Python's own overflow without an error.
+    parameters = [group.own_parameters.get(n, p) for n, p in enumerate(group.parameters)]
     # Row after row is read, so the members of a row lie beside each other.
     series = {n: a[0] if len(a) == 1 else np.ascontiguousarray(a.T) for n, a in data.items()}
     _fill(group, range(group.members), parameters, series, out, results)

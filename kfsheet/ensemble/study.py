@@ -129,25 +129,36 @@ def study(
     DataError
         For an unknown name, a shape that does not fit, a value that is not allowed, or a member
         whose computation has no value; the message names the member.
+    EngineError
+        If it shall be compiled and Numba is not installed.
+
+    Examples
+    --------
+    The gain of the football is a b / (r + a^2 b), with a = 44.2 and b = 0.01; here r = 1 and 100.
+
+    >>> from kfsheet.exercises.football.model import football
+    >>> found = study(football, 2, scalars=["K_x"], r_i=[1, 100])
+    >>> found.scalars["mean"].round(5).tolist()
+    [0.01261]
     """
     members, levels = checked_members(members), checked_quantiles(quantiles)
     columns, scalars = checked_names("columns", columns or ()), checked_scalars(model, scalars)
     nees = checked_nees(model, nees or {})
     check_executor(executor)
-    everyone = _all_members(
+    group = everyone(
         model, members, data, columns, scalars, nees, parameters, compiled,
         travels=executor is not None, keep=bool(levels),
     )  # fmt: skip
-    with Kept(len(everyone.kernel.scalars)) as kept:
-        found = computed(everyone, executor, kept)
+    with Kept(len(group.kernel.scalars)) as kept:
+        found = computed(group, executor, kept)
         lines = kept.quantiles(levels)
     named = {
         f"{repr(q).removesuffix('.0')} quantile": x for q, x in zip(levels, lines, strict=True)
     }
-    return _tables(model, [*columns, *nees], everyone.kernel.scalars, found, named)
+    return _tables(model, [*columns, *nees], group.kernel.scalars, found, named)
 
 
-def _all_members(
+def everyone(
     model: Recurrence,
     members: int,
     data: Mapping[str, Any] | Draws | None,
@@ -157,8 +168,8 @@ def _all_members(
     parameters: Mapping[str, Any],
     compiled: bool | None,
     *,
-    travels: bool,
-    keep: bool,
+    travels: bool = False,
+    keep: bool = False,
 ) -> Group:
     """All members as one group, which is then cut into parts."""
     shared, own = parameters_of_members(model, parameters, members)

@@ -69,10 +69,10 @@ def single(model, columns, scalars, data, **parameters):
     ("model", "columns", "own"),
     [
         (football, [], {"r_i": np.linspace(1, 100, MANY)}),
-        (football, ["x_a", "z_a", "d_i"], {}),  # side by side
+        (football, ["x_a", "z_a", "d_i"], {}),  # all share their parameters
         (cannonball, [], {}),
     ],
-    ids=["football", "football side by side", "cannonball"],
+    ids=["football", "football with shared parameters", "cannonball"],
 )
 def test_members_are_the_single_runs_bit_for_bit(monkeypatch, model, columns, own):
     """Every number of every member, before any statistics."""

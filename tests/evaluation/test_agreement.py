@@ -92,7 +92,7 @@ def ways(m):
         "single": lambda: single(True),
         "many": lambda: many(True),
         "many, each with its own": lambda: many(True, **own),
-        "many by Python": lambda: many(False, **own),
+        "many, by arrays": lambda: many(False, **own),
     }, lambda: single(False)
 
 
