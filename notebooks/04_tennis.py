@@ -23,24 +23,21 @@ from scipy.stats import chi2
 from sympy import Symbol, cos, init_printing, pi, simplify, sin, solve, symbols
 
 import kfsheet as kf
+
+# %%
 from kfsheet.exercises.tennis import build_model, exercise, read_drive, read_toss, tennis
 from kfsheet.exercises.tennis.methods import (
     calibration,
     cameras,
     centroid,
+    dynamics,
     loop,
     reprojection,
     shots,
     symbolic,
 )
 from kfsheet.exercises.tennis.methods.closed_form import closed_form
-from kfsheet.exercises.tennis.methods.dynamics import (
-    MASS,
-    TEXTBOOK_DRAG,
-    Ball,
-    impact,
-    nine_quantities,
-)
+from kfsheet.exercises.tennis.methods.dynamics import MASS, TEXTBOOK_DRAG, Ball, impact
 
 # %%
 init_printing(use_latex="mathjax", latex_printer=lambda e, **_: kf.latex_code(e))
@@ -339,7 +336,7 @@ print(f"{9.8 * 0.07**2 / 8 / 7 * cameras.FOCAL_LENGTH:.2f} px")
 
 # %%
 def drag_and_spin(points, start=0.0):
-    q = nine_quantities(A.times[seen] - start, points[seen])
+    q = dynamics.nine_quantities(A.times[seen] - start, points[seen])
     return np.array([MASS * q.kappa, *q.across])
 
 
