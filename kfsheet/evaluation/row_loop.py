@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING
 
 from sympy import Expr
 
-from kfsheet.model.expressions import column_references, lag
+from kfsheet.model.expressions import column_references, columns_read, lag
 from kfsheet.model.schedule import Pass, needed
-from kfsheet.model.validation import columns_read
 
 if TYPE_CHECKING:
     from kfsheet.model.quantities import Column, Scalar

@@ -1,11 +1,16 @@
-"""The few words that a recurrence adds to SymPy: row index, missing values, aggregates."""
+"""What a recurrence adds to SymPy: row index, missing values, aggregates; what is read."""
 
 from __future__ import annotations
 
-from sympy import Expr, Function, Indexed, IndexedBase, Piecewise, Symbol, true
+from collections.abc import Iterator
+from functools import lru_cache
+
+from sympy import Basic, Expr, Function, Indexed, IndexedBase, Piecewise, Symbol, true
 from sympy.core.singleton import Singleton
 from sympy.logic.boolalg import Boolean, BooleanFunction
 from sympy.printing.printer import Printer
+
+REMEMBERED = 4096  # expressions whose parts are asked for again and again
 
 t = Symbol("t", integer=True, nonnegative=True)
 """The row index. ``x_a[t - 1]`` is the cell above ``x_a[t]``."""
@@ -138,3 +143,23 @@ def column_references(expression: Expr) -> set[Indexed]:
 def lag(cell: Indexed) -> Expr:
     """How many rows above row ``t`` a reference lies: ``lag(x[t - 2])`` is 2."""
     return t - cell.indices[0]
+
+
+def walk(expression: Basic) -> Iterator[Basic]:
+    """Every node of an expression; a cell reference counts as one."""
+    yield expression
+    if not isinstance(expression, Indexed | IndexedBase):
+        for argument in expression.args:
+            yield from walk(argument)
+
+
+@lru_cache(maxsize=REMEMBERED)
+def scalars(expression: Basic) -> frozenset[Symbol]:
+    """Symbols that stand for scalars, or for the row index."""
+    return frozenset(node for node in walk(expression) if isinstance(node, Symbol))
+
+
+@lru_cache(maxsize=REMEMBERED)
+def columns_read(expression: Basic) -> frozenset[str]:
+    """Names of the columns that an expression reads, row by row or as a whole."""
+    return frozenset(str(base.label) for base in expression.atoms(IndexedBase))

@@ -20,6 +20,8 @@ from kfsheet.model.expressions import (
     ColumnBase,
     Missing,
     column_references,
+    columns_read,
+    scalars,
     t,
 )
 from kfsheet.model.names import name_problem, section_problem
@@ -120,20 +122,20 @@ class Recurrence:
     def derived(self, name: str, expression: Expr, unit: str, description: str) -> Symbol:
         """Add a scalar that is a formula of parameters and earlier scalars; see ``parameter``."""
         expression = self._checked(name, expression)
-        read = validation.scalars(expression) & {s.symbol for s in self.summaries.values()}
-        if validation.columns_read(expression) or t in validation.scalars(expression) or read:
+        read = scalars(expression) & {s.symbol for s in self.summaries.values()}
+        if columns_read(expression) or t in scalars(expression) or read:
             raise ModelError(f"derived scalar {name} reads a column; make it a summary or a column")
         return self._add_scalar(self.derived_scalars, name, expression, unit, description)
 
     def summary(self, name: str, expression: Expr, unit: str, description: str) -> Symbol:
         """Add a scalar made of aggregates of columns, as ``RMS(e_x)``; columns may read it."""
         expression = self._checked(name, expression)
-        if column_references(expression) or t in validation.scalars(expression):
+        if column_references(expression) or t in scalars(expression):
             raise ModelError(
                 f"summary {name} reads single rows; take Last, Mean, RMS, ... of columns"
             )
         symbol = self._add_scalar(self.summaries, name, expression, unit, description)
-        for read in validation.columns_read(expression):
+        for read in columns_read(expression):
             self._readers.setdefault(read, set()).add(name)
         return symbol
 
@@ -231,7 +233,7 @@ class Recurrence:
         if self.clock:
             raise ModelError("the clock is defined already")
         expression = self._checked("time", expression)
-        if validation.columns_read(expression):
+        if columns_read(expression):
             raise ModelError("the clock reads a column; give it as a formula of t and parameters")
         Unit.read(unit)
         self.clock = Column(ColumnBase("time", real=True), "", unit, description, expression)
@@ -408,8 +410,8 @@ class Recurrence:
     def _install(self, old: Column, new: Column) -> None:
         """Put a column into the table, unless it breaks those that are there."""
         self.table[new.name] = new
-        reads = {name for rule in new.rules for name in validation.columns_read(rule)}
-        symbols = {s.name for rule in new.rules for s in validation.scalars(rule)}
+        reads = {name for rule in new.rules for name in columns_read(rule)}
+        symbols = {s.name for rule in new.rules for s in scalars(rule)}
         readers = self._readers.get(new.name, set())
         try:
             validation.check_gaps(new, self.column)

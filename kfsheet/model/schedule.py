@@ -15,9 +15,8 @@ from typing import Any, Protocol
 from sympy import Basic
 
 from kfsheet.errors import ModelError
-from kfsheet.model.expressions import column_references, lag
+from kfsheet.model.expressions import REMEMBERED, column_references, columns_read, lag, scalars
 from kfsheet.model.quantities import Column, Scalar
-from kfsheet.model.validation import REMEMBERED, columns_read, scalars
 
 
 class Definitions(Protocol):

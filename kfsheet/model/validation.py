@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Set
-from functools import lru_cache
+from collections.abc import Callable, Mapping, Set
 from math import factorial
 from typing import Any
 
@@ -22,7 +21,15 @@ from sympy import (
 from sympy.logic.boolalg import And, Not, Or
 
 from kfsheet.errors import ModelError, PrintError
-from kfsheet.model.expressions import Aggregate, Last, Observed, column_references, lag
+from kfsheet.model.expressions import (
+    Aggregate,
+    Last,
+    Observed,
+    column_references,
+    lag,
+    scalars,
+    walk,
+)
 from kfsheet.model.quantities import Column, Scalar
 from kfsheet.printing.python import python_code
 
@@ -34,7 +41,6 @@ OF_SERIES = {
     *(factorial(i) * factorial(j) * (i + j + 1) for i in range(5) for j in range(5)),
 }
 FULL_CIRCLE = {60, 90, 180, 360}
-REMEMBERED = 4096  # expressions whose parts are asked for again and again by schedule()
 ENDLESS = 1_048_576  # more rows than a worksheet has
 
 
@@ -90,26 +96,6 @@ def _exact(number: Float) -> Expr:
     """Halves, quarters, ... as fractions; any other decimal number stays, to be refused."""
     fraction = Rational(float(number))
     return fraction if fraction.q <= LARGEST_DENOMINATOR else number
-
-
-def walk(expression: Basic) -> Iterator[Basic]:
-    """Every node of an expression; a cell reference counts as one."""
-    yield expression
-    if not isinstance(expression, Indexed | IndexedBase):
-        for argument in expression.args:
-            yield from walk(argument)
-
-
-@lru_cache(maxsize=REMEMBERED)
-def scalars(expression: Basic) -> frozenset[Symbol]:
-    """Symbols that stand for scalars, or for the row index."""
-    return frozenset(node for node in walk(expression) if isinstance(node, Symbol))
-
-
-@lru_cache(maxsize=REMEMBERED)
-def columns_read(expression: Basic) -> frozenset[str]:
-    """Names of the columns that an expression reads, row by row or as a whole."""
-    return frozenset(str(base.label) for base in expression.atoms(IndexedBase))
 
 
 def check_symbols(name: str, expression: Expr, known: Set[Basic]) -> None:

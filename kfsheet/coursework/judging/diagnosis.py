@@ -12,9 +12,8 @@ from sympy import Basic, Indexed, Number, Rational
 from kfsheet.coursework.judging.answer_key import ROUGH, AnswerKey, answer_key
 from kfsheet.coursework.judging.random_samples import OwnNumbers, Sampler
 from kfsheet.coursework.judging.typical_mistakes import MOST, typical_mistakes
-from kfsheet.model.expressions import t
+from kfsheet.model.expressions import t, walk
 from kfsheet.model.recurrence import Recurrence
-from kfsheet.model.validation import walk
 
 RIGHT, EMPTY, TYPED, WRONG = "right", "empty", "typed", "wrong"
 HARD_CODED, PARTLY, GAPS, NEARLY = "hard-coded", "partly right", "gaps forgotten", "nearly right"

@@ -48,8 +48,7 @@ from kfsheet.coursework.reading.submission import Book
 from kfsheet.coursework.reading.worksheet import Formula
 from kfsheet.errors import ForbiddenError, FormulaError
 from kfsheet.model.exercise import Exercise, Question
-from kfsheet.model.expressions import Aggregate, lag, t
-from kfsheet.model.validation import columns_read
+from kfsheet.model.expressions import Aggregate, columns_read, lag, t
 
 CREDIT = {RIGHT: 1.0, HARD_CODED: 0.5, PARTLY: 0.5, GAPS: 0.5, NEARLY: 0.5}
 """Share of the points by status; what is not listed gets none."""

@@ -20,10 +20,10 @@ from math import exp, isnan
 from sympy import Basic
 
 from kfsheet.coursework.judging.precise_values import MISSING, NoValueError, Value, exact, value_of
+from kfsheet.model.expressions import columns_read, scalars
 from kfsheet.model.quantities import Column, Parameter
 from kfsheet.model.recurrence import Recurrence
 from kfsheet.model.schedule import same_row
-from kfsheet.model.validation import columns_read, scalars
 from kfsheet.workbook.write.run import Run
 
 ALONE = -1

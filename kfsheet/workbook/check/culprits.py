@@ -14,8 +14,7 @@ from typing import Any
 from sympy import Expr, Indexed, IndexedBase
 
 from kfsheet.evaluation import numerics
-from kfsheet.model.expressions import lag, t
-from kfsheet.model.validation import walk
+from kfsheet.model.expressions import lag, t, walk
 from kfsheet.parsing.references import Address
 from kfsheet.printing.python import python_code
 from kfsheet.workbook.engines.spreadsheet_engine import CellValue, Values

@@ -13,10 +13,9 @@ from openpyxl.utils import get_column_letter
 
 from kfsheet.evaluation.numerics import rms
 from kfsheet.model.exercise import Exercise
-from kfsheet.model.expressions import Missing
+from kfsheet.model.expressions import Missing, columns_read
 from kfsheet.model.quantities import Column
 from kfsheet.model.unit_text import pretty_unit
-from kfsheet.model.validation import columns_read
 from kfsheet.workbook.write.layout import (
     EXERCISE_NAME,
     FIRST_ROW,
