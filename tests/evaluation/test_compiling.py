@@ -205,7 +205,7 @@ def test_a_compiler_that_fails_is_told_of_once_and_python_goes_on(monkeypatch):
     monkeypatch.setattr(compiling, "command", lambda *_: failing)
     monkeypatch.setattr(compiling, "_BACKGROUND", background)
     for name in ("LOADING", "COMPILING"):
-        monkeypatch.setattr(compiling, name, 1)
+        monkeypatch.setattr(compiling, name, 0)
     monkeypatch.setattr(model_cache, "LOADING", 1)
     evaluate(model)
     background._process.wait()
