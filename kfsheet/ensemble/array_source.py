@@ -20,7 +20,7 @@ from kfsheet.ensemble import array_functions
 from kfsheet.ensemble.array_printer import ArrayPrinter
 from kfsheet.evaluation.row_loop import Kernel, RowLoop
 from kfsheet.model.expressions import Missing
-from kfsheet.model.validation import scalars as scalars_in
+from kfsheet.model.expressions import scalars as scalars_in
 
 if TYPE_CHECKING:
     from kfsheet.model.quantities import Column, Scalar
