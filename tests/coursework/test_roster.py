@@ -1,4 +1,4 @@
-"""Rosters as spreadsheet programs and learning platforms write them, in tests/coursework/rosters."""
+"""Rosters as spreadsheet programs and platforms write them; files in tests/coursework/rosters."""
 
 import csv
 from pathlib import Path
