@@ -19,7 +19,7 @@ from kfsheet.errors import ModelError
 from kfsheet.model.exercise import Exercise, Question
 from kfsheet.workbook.write.layout import FIRST_ROW, TOKEN_NAME, Layout, quote
 from kfsheet.workbook.write.run import Run
-from kfsheet.workbook.write.sheet import Sheet
+from kfsheet.workbook.write.sheet import Sheet, Words
 
 SHEET, HIDDEN = "Questions", "kfsheet"
 FIRST, MODULUS = 7, 997
@@ -131,7 +131,7 @@ def _put_task(page: Sheet, row: int, task: tuple[str, ...]) -> None:
 
 
 def _put_paragraph(page: Sheet, row: int, words: str) -> None:
-    page.put(row, 1, words, "text", align="wrap")
+    page.put(row, 1, Words(words), "text", align="wrap")
     page.merges.append(f"A{row}:H{row}")
     page.heights[row] = 15 * (1 + len(words) // CHARACTERS_A_LINE) + 5
 
@@ -142,7 +142,7 @@ def _put_question(
     page.put(row, 1, question.name, "index")
     page.put(row, 2, question.points, "index", align="center")
     page.put(row, 3, place_of(layout, question).replace("$", ""), "index")
-    page.put(row, 4, question.hint, "meaning", align="wrap")
+    page.put(row, 4, Words(question.hint), "meaning", align="wrap")
     page.put(row, 7, right, "index", align="center")
     page.put(row, 10, sum(not isnan(v) for v in values), "index")
 

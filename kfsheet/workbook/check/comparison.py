@@ -43,6 +43,7 @@ class Comparison:
         self._tolerance = TOLERANCES[book.engine_name]
         self._values: Values = {}
         self._columns: dict[tuple[str, int], ColumnComparison | None] = {}
+        self._rounded = False  # whether a cell differs by rounding alone
         self.cells, self.largest = 0, 0.0
         self.differing: dict[Address, Cell] = {}
         self.problems: dict[Address, str] = {}
@@ -143,7 +144,8 @@ class Comparison:
         # Cells of no definition: the sheet Check, helper columns of charts. They follow from the
         # model's, unless somebody has written another formula into them.
         for address, cell in elsewhere:
-            if _plain(self._book.text(address)) != _plain(cell.content) or not self.problems:
+            followed = self.problems or self._rounded
+            if _plain(self._book.text(address)) != _plain(cell.content) or not followed:
                 self.problems[address] = self._words(cell.stored, address)
 
     def _judge(self, address: Address, cell: Cell, cell_by_cell: CellByCell) -> None:
@@ -164,6 +166,10 @@ class Comparison:
         scale = max((size for size in sizes if not math.isnan(size)), default=math.nan)
         if self._agree(address, expected, scale, keep=False):
             return
+        far = abs(number(self._value(address)) - (computed or math.nan))
+        if far <= cell_by_cell.rounding(address):
+            self._rounded = True
+            return  # its terms cancel, and no two programs need agree in what is left
         if any(_no_number(self._value(other)) for other in wrong):
             return  # an answer is still to be filled in; a sheet reads 0 where NumPy has no value
         self.problems[address] = self._words(expected, address)

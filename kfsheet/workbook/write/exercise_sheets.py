@@ -25,7 +25,7 @@ from kfsheet.workbook.write.layout import (
     quote,
 )
 from kfsheet.workbook.write.run import Run
-from kfsheet.workbook.write.sheet import Cell, FilledColumn, Sheet, stored_value
+from kfsheet.workbook.write.sheet import Cell, FilledColumn, Sheet, Words, stored_value
 from kfsheet.workbook.write.styles import LEGEND, number_format
 
 NOT_AVAILABLE = "#N/A"
@@ -146,7 +146,7 @@ def charts_sheet(exercise: Exercise, layout: Layout, now: Run) -> Sheet:
     sheet = Sheet("Charts")
     sheet.put(1, 1, exercise.title, "title")
     for number, chart in enumerate(exercise.charts):
-        sheet.put(*chart_place(number), chart.note, "note")
+        sheet.put(*chart_place(number), Words(chart.note), "note")
     names = helper_columns(exercise)
     if names:
         sheet.put(2, 1, "Helper columns for the charts stand from AA on.")
@@ -199,7 +199,7 @@ def readme_sheet(exercise: Exercise, layout: Layout) -> Sheet:
     sheet.put(1, 1, exercise.title, "title")
     row = 3
     for paragraph in exercise.about:
-        sheet.put(row, 1, paragraph, "text", align="wrap")
+        sheet.put(row, 1, Words(paragraph), "text", align="wrap")
         sheet.merges.append(f"A{row}:B{row}")
         sheet.heights[row] = 16 * (1 + len(paragraph) // CHARACTERS_A_LINE) + 4
         row += 1
@@ -220,5 +220,5 @@ def _block(sheet: Sheet, row: int, title: str, lines: list[tuple[str, str, str]]
     for words, kind, name in lines:
         row += 1
         sheet.put(row, 1, name, kind)
-        sheet.put(row, 2, words, "text", align="wrap")
+        sheet.put(row, 2, Words(words), "text", align="wrap")
     return row + 1

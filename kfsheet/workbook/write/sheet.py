@@ -15,6 +15,12 @@ Formula = Callable[[int], str]
 """Text of a formula, ``=`` included, by the row that it stands in."""
 
 
+class Words(str):
+    """What a person wrote: no formula, whatever it begins with."""
+
+    __slots__ = ()
+
+
 class Cell(NamedTuple):
     """One cell: its content (``=`` begins a formula), kind of style, value of the formula."""
 
@@ -114,4 +120,5 @@ def stored_value(value: Any, missing: str = "") -> Any:
 
 def is_formula(content: object) -> bool:
     """Whether the content of a cell is a formula."""
-    return isinstance(content, str) and content.startswith("=")
+    text = isinstance(content, str) and not isinstance(content, Words)
+    return text and content.startswith("=")
