@@ -110,7 +110,7 @@ def run_grade(arguments: argparse.Namespace) -> int:
     from kfsheet.coursework.reports.assessment import NO_TOKEN
     from kfsheet.coursework.reports.grading import grade, override
     from kfsheet.coursework.reports.overrides import read_overrides, with_all_marks
-    from kfsheet.coursework.reports.reports import write_reports
+    from kfsheet.coursework.reports.report_files import write_reports
     from kfsheet.exercises import load_exercise
 
     exercise = load_exercise(arguments.exercise)

@@ -36,7 +36,8 @@ from kfsheet.ensemble.study_inputs import (
     data_of_members,
     parameters_of_members,
 )
-from kfsheet.evaluation.compiling import LOADING, pays
+from kfsheet.errors import EngineError
+from kfsheet.evaluation.compiling import LOADING, MISSING, can_compile, pays
 from kfsheet.evaluation.kernel import kernel_of
 from kfsheet.evaluation.model_cache import cache_of, gaps_of
 from kfsheet.evaluation.python_source import python_source
@@ -141,6 +142,7 @@ def study(
     >>> found.scalars["mean"].round(5).tolist()
     [0.01261]
     """
+    cache_of(model)  # refuses what is no recurrence, or not complete
     members, levels = checked_members(members), checked_quantiles(quantiles)
     columns, scalars = checked_names("columns", columns or ()), checked_scalars(model, scalars)
     nees = checked_nees(model, nees or {})
@@ -213,6 +215,8 @@ def _kernel(
 ) -> tuple[Kernel, bool]:
     """The kernel of a study, and whether it is for the compiler."""
     what = model, model.version, columns, scalars
+    if compiled and not can_compile():
+        raise EngineError(MISSING)
     if compiled:
         return kernel_of(*what), True
     if compiled is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +29,8 @@ def checked_names(what: str, names: Any) -> list[str]:
     """Names, each once."""
     if isinstance(names, str):
         raise DataError(f"{what} is the text {names!r}; give a list: [{names!r}]")
+    if not isinstance(names, Iterable):
+        raise DataError(f"{what} is {names!r}; give a list of names")
     return list(dict.fromkeys(names))
 
 

@@ -11,16 +11,16 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from kfsheet.errors import ModelError
 from kfsheet.evaluation.compiling import LOADING, pays
 from kfsheet.evaluation.kernel import kernel_of
 from kfsheet.evaluation.row_loop import Kernel
+from kfsheet.model.recurrence import Recurrence
 from kfsheet.model.run_inputs import check_data_name, checked_array
 from kfsheet.model.schedule import needed
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from kfsheet.model.recurrence import Recurrence
 
 
 @dataclass
@@ -106,6 +106,9 @@ _CACHES: WeakKeyDictionary[Recurrence, tuple[int, ModelCache]] = WeakKeyDictiona
 
 def cache_of(model: Recurrence) -> ModelCache:
     """What every run of a model needs; found anew when something was added to it."""
+    if not isinstance(model, Recurrence):
+        remedy = ": exercise.model" if hasattr(model, "model") else ""
+        raise ModelError(f"a {type(model).__name__} cannot be run; give a Recurrence{remedy}")
     version, cache = _CACHES.get(model, (None, None))
     if version != model.version:
         model.validate()

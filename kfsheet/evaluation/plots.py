@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from kfsheet.errors import DataError
+from kfsheet.errors import DataError, EngineError
 from kfsheet.model.chart import LOOKS, Chart
 
 if TYPE_CHECKING:
@@ -31,9 +31,13 @@ def draw(chart: Chart, frame: pd.DataFrame, ax: Axes | None = None) -> Axes:
     ------
     DataError
         If the frame lacks a column of the chart.
+    EngineError
+        If matplotlib is not installed.
     """
-    import matplotlib.pyplot as plt
-
+    try:
+        import matplotlib.pyplot as plt
+    except ImportError:
+        raise EngineError('drawing needs matplotlib: pip install "kfsheet[plots]"') from None
     wanted = {name for series in chart.series for name in (series.x, series.y)}
     wanted |= {chart.where} - {""}
     if missing := sorted(wanted - set(frame.columns)):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import lru_cache
+from typing import Self
 
 from sympy import Basic, Expr, Function, Indexed, IndexedBase, Piecewise, Symbol, true
 from sympy.core.singleton import Singleton
@@ -20,6 +21,10 @@ class Observed(BooleanFunction):
     """``Observed(i[t])``: the cell holds a number (ISNUMBER in a sheet, not-NaN in NumPy)."""
 
     nargs = 1
+
+    def __new__(cls, *cells: Expr, **options: bool) -> Self:
+        """The condition on one cell."""
+        return super().__new__(cls, *cells, **options)
 
     @classmethod
     def eval(cls, cell: Expr) -> Boolean | None:
@@ -72,6 +77,11 @@ class Aggregate(Function):
 
     nargs = 1
     is_real = True
+
+    # SymPy's own is unknown to type checkers, which would take every aggregate for Any.
+    def __new__(cls, *columns: Expr, **options: bool) -> Self:
+        """The aggregate of one column, or of two."""
+        return super().__new__(cls, *columns, **options)
 
     @classmethod
     def eval(cls, column: IndexedBase) -> None:

@@ -5,6 +5,7 @@ from importlib import import_module
 from pkgutil import iter_modules
 from warnings import warn
 
+from kfsheet.exercises import tennis
 from kfsheet.exercises.tennis import methods
 
 warn(
@@ -12,7 +13,16 @@ warn(
     DeprecationWarning,
     stacklevel=2,
 )
-for _module in iter_modules(methods.__path__):
+_HOMES = {
+    module.name: f"{methods.__name__}.{module.name}" for module in iter_modules(methods.__path__)
+}
+_HOMES |= {
+    "charts": f"{tennis.__name__}.charts",
+    "inputs": f"{methods.__name__}.arguments",
+    "sheets": f"{tennis.__name__}.calculators",
+    "track": f"{tennis.__name__}.track",
+}
+for _name, _home in _HOMES.items():
     # The very same modules under both names: a Camera of one is a Camera of the other.
-    _found = import_module(f"{methods.__name__}.{_module.name}")
-    sys.modules[f"{__name__}.{_module.name}"] = globals()[_module.name] = _found
+    _found = import_module(_home)
+    sys.modules[f"{__name__}.{_name}"] = globals()[_name] = _found

@@ -62,3 +62,14 @@ def test_a_public_name_is_there(name):
 def test_a_name_that_is_not_there_is_an_attribute_error():
     with pytest.raises(AttributeError, match="worlds"):
         kfsheet.worlds  # noqa: B018 - looking is the deed
+
+
+def test_no_public_name_is_any(tmp_path):
+    """What mypy reveals of each; a type such as ``type[Any]`` would hide every mistake as well."""
+    names = [name for name in kfsheet.__all__ if name not in ("Missing", "t", "__version__")]
+    lines = ["import kfsheet", *(f"reveal_type(kfsheet.{name})" for name in names)]
+    (tmp_path / "names.py").write_text("\n".join(lines) + "\n")
+    said = [line for line in mypy(tmp_path / "names.py").splitlines() if "Revealed" in line]
+    assert len(said) == len(names)
+    revealed = {n: line.split('"')[1] for n, line in zip(names, said, strict=True)}
+    assert [n for n, kind in revealed.items() if kind in ("Any", "type[Any]")] == []

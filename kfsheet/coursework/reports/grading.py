@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import kfsheet
+from kfsheet import __version__
 from kfsheet.coursework.handout import course_secret
 from kfsheet.coursework.judging.judge import Mark
 from kfsheet.coursework.reading.roster import Student
@@ -153,7 +153,7 @@ def _key(path: Path, version: str, secret: bytes) -> str:
                 content.update(block)
     except OSError:
         content.update(str(path).encode())
-    parts = ("key", version, kfsheet.__version__, content.hexdigest())
+    parts = ("key", version, __version__, content.hexdigest())
     return course_secret.digest(secret, *parts).hex()[:32]
 
 

@@ -37,7 +37,7 @@ def _ironcalc() -> ModuleType:
         import ironcalc
     except ImportError:
         raise EngineError(
-            'IronCalc is not installed; pip install "kfsheet[check]", or use --engine libreoffice'
+            'IronCalc is not installed; pip install "kfsheet[check]", or use libreoffice'
         ) from None
     return ironcalc
 

@@ -23,6 +23,19 @@ def test_the_former_name_of_the_tennis_methods_warns_and_tells_the_new_one(forgo
         importlib.import_module("kfsheet.tennis")
 
 
+FORMER = (
+    "calibration cameras centroid charts closed_form cones dynamics inputs loop reprojection "
+    "sheets shots symbolic track"
+).split()
+
+
+def test_every_module_of_the_former_package_is_found(forgotten):
+    with pytest.warns(DeprecationWarning, match="0.3.0"):
+        importlib.import_module("kfsheet.tennis")
+    for name in FORMER:
+        assert importlib.import_module(f"kfsheet.tennis.{name}")
+
+
 def test_a_camera_of_the_former_name_is_a_camera_of_the_new_one(forgotten):
     with pytest.warns(DeprecationWarning, match="0.3.0"):
         former = importlib.import_module("kfsheet.tennis.cameras")
