@@ -37,7 +37,14 @@ from kfsheet.ensemble.study_inputs import (
     parameters_of_members,
 )
 from kfsheet.errors import EngineError
-from kfsheet.evaluation.compiling import LOADING, MISSING, can_compile, pays
+from kfsheet.evaluation.compiling import (
+    COMPILING,
+    LOADING,
+    MISSING,
+    can_compile,
+    nothing_is_ready,
+    pays,
+)
 from kfsheet.evaluation.kernel import kernel_of
 from kfsheet.evaluation.model_cache import cache_of, gaps_of
 from kfsheet.evaluation.python_source import python_source
@@ -225,7 +232,8 @@ def _kernel(
         cells = cache.cells(model, (*columns, *(every if scalars is None else scalars)))
         cells, before = members * cells // ARRAYS, cache.computed[what[2:]]
         # Printing a kernel takes as long as a small study.
-        if cells + before >= LOADING and pays(kernel_of(*what).source, cells, before):
+        least = COMPILING if nothing_is_ready() else LOADING
+        if cells + before >= least and pays(kernel_of(*what).source, cells, before):
             return kernel_of(*what), True
         cache.computed[what[2:]] += cells
     return arrays_of(*what), False

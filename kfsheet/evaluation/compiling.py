@@ -59,6 +59,11 @@ def pays(source: str, cells: int, before: int) -> bool:
     return False
 
 
+def nothing_is_ready() -> bool:
+    """Whether no kernel at all was compiled here, so that none need be printed to look for it."""
+    return not can_compile() or next(cache_folder().glob("kernel_*.ready"), None) is None
+
+
 def compiled_function(source: str) -> Callable:
     """The compiled function of a kernel's source; from disk if it was compiled before.
 
