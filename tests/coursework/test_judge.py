@@ -243,6 +243,7 @@ def test_a_formula_split_over_several_helper_columns_and_names_is_right(football
         ("x_a", "=C{r}/a", "wrong", "value than"),
         ("x_a", '=WEBSERVICE("http://localhost/"&G{r})', "refused", "WEBSERVICE"),
         ("x_a", '=INDIRECT("G{r}")', "refused", "INDIRECT"),
+        ("x_a", '=indirect \n ("G{r}")', "refused", "INDIRECT"),
         ("x_a", "=cmd|'/c calc'!A1", "refused", "DDE"),
         ("x_a", "=12.5", "typed", "number"),
         ("x_a", "=P{r}", "wrong", "value than"),

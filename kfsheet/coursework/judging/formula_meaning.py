@@ -29,6 +29,7 @@ DANGEROUS = frozenset(
     "WEBSERVICE HYPERLINK INDIRECT DDE RTD CALL REGISTER.ID FILTERXML IMAGE IMPORTXML IMPORTDATA "
     "IMPORTHTML IMPORTRANGE IMPORTFEED CUBEVALUE EXEC SQL.REQUEST".split()
 )
+BEFORE_ARGUMENTS = re.compile(r"\s+\(")
 LINK = re.compile(r"\[\d+\]")
 DEEPEST_HELPERS = 40  # helper cell upon helper cell
 LARGEST = 3_000  # nodes of an expression, helpers written out
@@ -160,7 +161,7 @@ class Interpreter:
 def forbidden(text: str) -> str | None:
     """What a formula uses that no answer may use, if there is such a thing."""
     # As text, before anything is parsed: also in a branch that is never taken, or in a string.
-    upper = text.upper()
+    upper = BEFORE_ARGUMENTS.sub("(", text.upper())  # INDIRECT ("B8") is a call too
     if found := next((name for name in DANGEROUS if f"{name}(" in upper), None):
         return found
     if LINK.search(text):
