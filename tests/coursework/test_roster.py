@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from kfsheet import load_exercise
 from kfsheet.coursework.reading.roster import Student, harmless, read_roster
+from kfsheet.coursework.reports.overrides import read_overrides
 from kfsheet.errors import DataError
 
 ROSTERS = Path(__file__).parent / "rosters"
@@ -70,3 +72,19 @@ def test_no_cell_is_a_formula_in_any_locale(separator, begin):
     cells = [c for line in csv.reader(text.splitlines(), delimiter=separator) for c in line]
     assert not any(cell.strip().startswith(begin) for cell in cells)
     assert harmless("Doe-Jane, 3 = 1 + 2") == "Doe-Jane, 3 = 1 + 2"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "id,question,score,remark\nq7,u,1.5,kind\n",
+        "\ufeffsep=;\r\nid;question;score;remark\r\nq7;u;1,5;kind\r\n;;;\r\n",
+        "id\tquestion\tscore\tremark\nq7\tu\t1.5\tkind\n\t\t\t\n",
+    ],
+    ids=["comma", "as Excel writes it", "tabs"],
+)
+def test_a_lecturers_own_marks_are_read_as_rosters_are(tmp_path, text):
+    path = tmp_path / "overrides.csv"
+    path.write_bytes(text.encode())
+    found = read_overrides(path, load_exercise("football"), {"q7"})
+    assert found == [{"id": "q7", "question": "u", "score": 1.5, "remark": "kind"}]

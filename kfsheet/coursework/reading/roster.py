@@ -52,14 +52,14 @@ def read_roster(path: str | Path) -> list[Student]:
         raise DataError(f"the roster {path} cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
         raise DataError(f"the roster {path} is not UTF-8; save it as CSV UTF-8") from None
-    lines = _lines(text)
+    lines = records(text)
     fields = [(field or "").strip().lower() for field in lines.fieldnames or ()]
     if missing := {"id", "name"} - set(fields):
         raise DataError(f"the roster {path} has no column {sorted(missing)[0]!r}; give id,name")
     lines.fieldnames = fields
     known: dict[str, tuple[Student, int]] = {}
     for line in lines:
-        if any(map(_has_text, line.values())):
+        if any(map(has_text, line.values())):
             student = _student(line, f"{path}, line {lines.line_num}")
             _refuse_twins(path, known, student, lines.line_num)
             known[student.id.lower()] = student, lines.line_num
@@ -68,7 +68,7 @@ def read_roster(path: str | Path) -> list[Student]:
     return [student for student, _ in known.values()]
 
 
-def _lines(text: str) -> csv.DictReader:
+def records(text: str) -> csv.DictReader:
     """Lines by the names in the header, whatever separates the fields."""
     announced = SEPARATOR_LINE.match(text)
     body = text[announced.end() :] if announced else text
@@ -79,12 +79,13 @@ def _lines(text: str) -> csv.DictReader:
     return csv.DictReader(StringIO(body, newline=""), delimiter=delimiter, skipinitialspace=True)
 
 
-def _has_text(field: str | list[str] | None) -> bool:
+def has_text(field: str | list[str] | None) -> bool:
+    """Whether a field holds more than white space."""
     return bool("".join(field or ()).strip())
 
 
 def _student(line: dict[str | None, Any], where: str) -> Student:
-    if _has_text(line.get(None)):
+    if has_text(line.get(None)):
         raise DataError(
             f"{where} has more fields than the header; put a field that holds a separator in "
             'quotes, as in "Doe, Jane"'

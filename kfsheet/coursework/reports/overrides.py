@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 from typing import Any
 
 from kfsheet.coursework.judging.judge import Mark
+from kfsheet.coursework.reading.roster import has_text, records
 from kfsheet.coursework.reports.grading import Result
 from kfsheet.errors import DataError
 from kfsheet.files import write_file
@@ -28,12 +28,15 @@ def read_overrides(path: Path, exercise: Exercise, ids: set[str]) -> list[dict[s
         write_file(path, HEAD.encode())
         return []
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError:
         raise DataError(f"{path} is not UTF-8; save it as CSV UTF-8") from None
-    delimiter = ";" if text.partition("\n")[0].count(";") > 0 else ","
-    lines = list(csv.DictReader(text.splitlines(), delimiter=delimiter))
-    return [_checked(line, f"{path}, line {n}", exercise, ids) for n, line in enumerate(lines, 2)]
+    lines = records(text)
+    return [
+        _checked(line, f"{path}, line {lines.line_num}", exercise, ids)
+        for line in lines
+        if any(map(has_text, line.values()))
+    ]
 
 
 def _checked(line: dict[str, str], where: str, exercise: Exercise, ids: set[str]) -> dict[str, Any]:
