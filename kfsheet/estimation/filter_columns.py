@@ -200,11 +200,11 @@ class FilterColumns(FilterCells):
         K = {i: self.cell(f"K_{self.names[i]}_{o.name}") for i in touched}
         for i in touched:
             # Without an observation the gain is 0, not missing: P then stays what it was.
-            gain = self.guarded(self.gated(o, Ph[i] / S_o, d, S_o), asked, S.Zero)
+            gain = self.guarded(self.gated(o, Ph[i] / S_o, d, S.Zero), asked, S.Zero)
             words = f"gain: {self.names[i]} for one unit of {d.base}"
             yield self.column(f"K_{self.names[i]}_{o.name}", gain, self.units[i] / unit, words)
         yield from self.moved_state(k, K, d, asked)
-        yield from self.moved_covariance(o, k, K)
+        yield from self.moved_covariance(o, k, K, asked)
 
     def moved_state(
         self, k: int, K: dict[int, Indexed], d: Indexed, asked: tuple[Indexed, ...]
@@ -219,19 +219,30 @@ class FilterColumns(FilterCells):
             self.x[i] = self.cell(f"{self.names[i]}_{stage}")
 
     def moved_covariance(
-        self, o: Observation, k: int, K: dict[int, Indexed]
+        self, o: Observation, k: int, K: dict[int, Indexed], asked: tuple[Indexed, ...]
     ) -> Iterator[Definition]:
         """The covariance: P <- P - K S K', the upper triangle."""
-        S_o = self.cell(f"S_{o.name}")
+        S_o, alone = self.cell(f"S_{o.name}"), self.seen_alone(k)
         for i, j in self.pairs():
             if i in K and j in K:
-                stage = self.stage(k, i, j)
-                # K S K' is symmetric as computed, K h P only in exact arithmetic.
-                rule = self.P[i, j] - K[i] * K[j] * S_o
-                rule = self.guarded(rule, (S_o,) if self.gaps(o.variance) else (), self.P[i, j])
+                stage, before = self.stage(k, i, j), self.P[i, j]
+                if alone in (i, j):
+                    # Of the one element that is seen, P - K S K' is P r/S: without a difference,
+                    # which would leave nothing of a precise sensor's r beside a start of 1e10.
+                    rule = self.gated(o, before * o.variance / S_o, self.weighed[-1][0], before)
+                    rule = self.guarded(rule, asked + self.gaps(o.variance), before)
+                else:
+                    # K S K' is symmetric as computed, K h P only in exact arithmetic.
+                    rule = before - K[i] * K[j] * S_o
+                    rule = self.guarded(rule, (S_o,) if self.gaps(o.variance) else (), before)
                 start = self.cell(self.P_name(i, j, "f")) if stage == "a" else Missing
                 yield self.covariance(i, j, stage, rule, start)
                 self.P[i, j] = self.P[j, i] = self.cell(self.P_name(i, j, stage))
+
+    def seen_alone(self, k: int) -> int | None:
+        """The element that observation k depends on, if it is the only one."""
+        seen = [j for j in self.all if self.model.H[k, j] != 0]
+        return seen[0] if len(seen) == 1 else None
 
     def stage(self, k: int, *elements: int) -> str:
         """Where observation k brings some elements: to the analysis, if it is the last for them."""
@@ -270,12 +281,12 @@ class FilterColumns(FilterCells):
         words = f"normalised innovation squared; expected: {len(parts)}"
         yield self.column("NIS", rule, Unit.read(""), words)
 
-    @staticmethod
-    def gated(o: Observation, gain: Expr, d: Indexed, S_o: Indexed) -> Expr:
-        """The gain, and 0 for an innovation beyond the gate: then neither x nor P moves."""
+    def gated(self, o: Observation, rule: Expr, d: Indexed, otherwise: Expr) -> Expr:
+        """A rule for an innovation within the gate; beyond it neither x nor P moves."""
         if o.gate is None:
-            return gain
-        return Piecewise((gain, Abs(d) <= o.gate * sqrt(S_o)), (S.Zero, True))
+            return rule
+        within = Abs(d) <= o.gate * sqrt(self.cell(f"S_{o.name}"))
+        return Piecewise((rule, within), (otherwise, True))
 
 
 def _check_names(m: Recurrence, model: StateSpace) -> None:

@@ -14,7 +14,8 @@ from kfsheet.model.exercise import Exercise
 def gradebooks(exercise: Exercise, results: list[Result]) -> dict[str, str]:
     """Text of each table by the name of its file."""
     return {
-        "grades.csv": _grades(exercise, results),
+        # Excel takes a file for UTF-8 only behind a byte-order mark; platforms choke on one.
+        "grades.csv": "\ufeff" + _grades(exercise, results),
         "moodle.csv": _moodle(results),
         "canvas.csv": _canvas(exercise, results),
     }
@@ -22,7 +23,8 @@ def gradebooks(exercise: Exercise, results: list[Result]) -> dict[str, str]:
 
 def _table(head: Iterable[str], lines: Iterable[Iterable[object]]) -> str:
     text = StringIO()
-    writer = csv.writer(text, lineterminator="\n")
+    # Every text in quotes: a semicolon in it splits no cell where lists are separated by those.
+    writer = csv.writer(text, lineterminator="\n", quoting=csv.QUOTE_NONNUMERIC)
     writer.writerow(head)
     for line in lines:
         # A remark may quote a student: no cell of a lecturer's table may become a formula.
@@ -65,10 +67,7 @@ def _canvas(exercise: Exercise, results: list[Result]) -> str:
     head = ["Student", "ID", "SIS Login ID", "Section", exercise.title]
     return _table(
         head,
-        (
-            [r.student.name, "", r.student.email or r.student.id, "", points_shown(r.score)]
-            for r in results
-        ),
+        ([r.student.name, "", r.student.login, "", points_shown(r.score)] for r in results),
     )
 
 
