@@ -71,8 +71,8 @@ def counted() -> pd.DataFrame:
 
 def step(x, P, A, u, H, Q, R, y):  # noqa: ANN001, ANN201 - arrays, stacked or not
     """One step of the filter, equations (10) to (14)."""
-    x, P = A @ x + u, A @ P @ A.mT + Q
-    PH = P @ H.mT
+    x, P = A @ x + u, A @ P @ np.swapaxes(A, -1, -2) + Q
+    PH = P @ np.swapaxes(H, -1, -2)
     K = PH @ np.linalg.inv(H @ PH + R)
     return x + K @ (y - H @ x), P - K @ H @ P
 
