@@ -5,7 +5,7 @@ import random
 import mpmath
 import pytest
 
-from kfsheet.workbook.check.rounding_error import rounding_bound
+from kfsheet.workbook.check.rounding_error import followed_names, rounding_bound
 
 DOUBLES = {n: getattr(__import__("math"), n) for n in "sin cos exp log sqrt atan2 floor".split()}
 EXACT = {n: getattr(mpmath, n) for n in "sin cos exp log sqrt atan2 floor".split()}
@@ -31,12 +31,12 @@ def test_the_bound_holds_and_is_no_excuse_for_everything(source):
         x, y = 10 ** dice.uniform(-6, 0), 10 ** dice.uniform(0, 6)
         found = eval(source, {**DOUBLES, "x": x, "y": y})
         wanted = eval(source, {**EXACT, "x": mpmath.mpf(x), "y": mpmath.mpf(y)})
-        bound = rounding_bound(source, {"x": x, "y": y})
+        bound = rounding_bound(source, followed_names({"x": x, "y": y}))
         assert abs(found - wanted) <= bound
         assert bound <= 1e-9 * (1 + y) ** 2 / x
 
 
 def test_a_formula_without_cancellation_gets_a_bound_of_its_last_digits():
     gain = "a*b_x/(r_i + a**2*b_x)"  # 0.0138
-    assert rounding_bound(gain, {"a": 56.3, "b_x": 0.01, "r_i": 9.0}) < 1e-15
-    assert rounding_bound("x[t] + 2", {"x": [1.0, 2.0], "t": 1}) < 2e-14
+    assert rounding_bound(gain, followed_names({"a": 56.3, "b_x": 0.01, "r_i": 9.0})) < 1e-15
+    assert rounding_bound("x[t] + 2", followed_names({"x": [1.0, 2.0], "t": 1})) < 2e-14

@@ -166,7 +166,7 @@ class Comparison:
         scale = max((size for size in sizes if not math.isnan(size)), default=math.nan)
         if self._agree(address, expected, scale, keep=False):
             return
-        far = abs(number(self._value(address)) - (computed or math.nan))
+        far = abs(number(self._value(address)) - (math.nan if computed is None else computed))
         if far <= cell_by_cell.rounding(address):
             self._rounded = True
             return  # its terms cancel, and no two programs need agree in what is left

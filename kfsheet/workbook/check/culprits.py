@@ -17,7 +17,7 @@ from kfsheet.evaluation import numerics
 from kfsheet.model.expressions import lag, t, walk
 from kfsheet.parsing.references import Address
 from kfsheet.printing.python import python_code
-from kfsheet.workbook.check.rounding_error import rounding_bound
+from kfsheet.workbook.check.rounding_error import followed_names, rounding_bound
 from kfsheet.workbook.engines.spreadsheet_engine import CellValue, Values
 from kfsheet.workbook.write.layout import FIRST_ROW, Layout
 
@@ -80,7 +80,11 @@ class CellByCell:
     def rounding(self, address: Address) -> float:
         """How far a right program may be off, given the others, where terms cancel."""
         definition, row = self.definitions[address]
-        return rounding_bound(python_code(definition), {**self._namespace, "t": row})
+        return rounding_bound(python_code(definition), {**self._followed, "t": row})
+
+    @cached_property
+    def _followed(self) -> dict[str, Any]:
+        return followed_names(self._namespace)
 
     def _home(self, name: str, sheet: str) -> tuple[str, int]:
         """Sheet and number of a column; the own sheet comes first, as in formulas."""

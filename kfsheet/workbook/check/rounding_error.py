@@ -177,6 +177,11 @@ class _Cells(list):
         return Rounded(super().__getitem__(row))
 
 
+def followed_names(names: Mapping[str, Any]) -> dict[str, Any]:
+    """The names of a model and of its functions, for :func:`rounding_bound`; made once."""
+    return {**{name: _followed_name(value) for name, value in names.items()}, **FUNCTIONS}
+
+
 def _followed_name(value: Any) -> Any:
     if isinstance(value, list):
         return _Cells(value)
@@ -191,16 +196,15 @@ def rounding_bound(source: str, names: Mapping[str, Any]) -> float:
     source : str
         An expression over the names of :mod:`kfsheet.evaluation.numerics` and of the model.
     names : mapping
-        Values by name, columns as lists.
+        What :func:`followed_names` makes of values by name, columns being lists.
 
     Examples
     --------
-    >>> rounding_bound("1 - cos(x)", {"x": 1e-4}) > 1e-16
+    >>> rounding_bound("1 - cos(x)", followed_names({"x": 1e-4})) > 1e-16
     True
     """
-    known = {name: _followed_name(value) for name, value in names.items()}
     try:
-        found = eval(source, {**known, **FUNCTIONS})  # printed by python_code
+        found = eval(source, dict(names))  # printed by python_code
     except (ArithmeticError, ValueError, TypeError):
         return 0.0
     bound = found.error if isinstance(found, Rounded) else 0.0
