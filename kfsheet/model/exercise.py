@@ -76,6 +76,9 @@ class Exercise:
         answer's, for another axis or camera. An answer may read them.
     draw : function of (generator, parameters), optional
         Draws other data columns anew, as lists by name; None in a list is a missing value.
+    ranges : dict
+        Data columns whose values lie between two numbers whatever happens, such as pixels: lowest
+        and highest value by name. Answers are not judged beyond.
 
     Raises
     ------
@@ -99,6 +102,7 @@ class Exercise:
     veiled: tuple[str, ...] = ()
     sealed: tuple[str, ...] = ()
     draw: Draw | None = None
+    ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, kind in (
@@ -137,9 +141,10 @@ class Exercise:
             low, high = (self.model.parameters[name].checked(limit) for limit in limits)
             if not low < high:
                 raise ModelError(f"{self.name}: vary {name} needs a lower and a higher value")
-        for name in self.noise:
-            if not self.model.column(name).is_data:
-                raise ModelError(f"{self.name}: noise names {name}, which is no data column")
+        for words, names in (("noise", self.noise), ("ranges", self.ranges)):
+            for name in names:
+                if not self.model.column(name).is_data:
+                    raise ModelError(f"{self.name}: {words} names {name}, which is no data column")
 
     def _check_question(self, question: Question) -> None:
         if not isinstance(question.points, int) or question.points <= 0:

@@ -517,7 +517,7 @@ def test_a_formula_that_takes_for_ever_costs_its_own_answer_only(football, monke
 def test_an_answer_for_which_there_was_no_time_is_not_kept(football, monkeypatch, tmp_path):
     """A machine was busy: grading again judges what it could not."""
     football.answer_all()
-    football.answer("u", lambda text, _: f"=IFERROR({text[1:]},0)")
+    football.answer("u", lambda text, _: f"={text[1:]}+0*BESSELJ(1,1)")
     path = football.save()
 
     def graded(seconds):

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 from openpyxl.utils import get_column_letter
-from sympy import Basic
 
+from kfsheet.coursework.judging.calculated_answers import Outcome
 from kfsheet.coursework.judging.formula_meaning import parsed
 from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.coursework.reading.submission import Book
@@ -23,9 +23,10 @@ class AnswerCell:
     step: int
     address: Address
     status: str
-    expression: Basic | None = None
-    fixed: tuple[int, ...] = ()
     words: str = ""
+    pattern: str = ""
+    """What the formulas of a column that was filled down have in common."""
+    outcomes: tuple[Outcome, ...] = field(default=(), repr=False)
 
 
 def content_of(book: Book, cell: AnswerCell) -> Content | None:
@@ -37,10 +38,10 @@ def not_in(book: Book, rest: list[AnswerCell], right: list[AnswerCell]) -> str:
     """Rows that are not right, and what the first of them reads that the right ones do not."""
     first, content = rest[0], content_of(book, rest[0])
     words = f"not in {rows_of(rest)}"
-    if not isinstance(content, Formula):
+    if not isinstance(content, Formula) or not isinstance(content_of(book, right[-1]), Formula):
         return words
-    known = set(parsed(content_of(book, right[-1]))[1])
     try:
+        known = set(parsed(content_of(book, right[-1]))[1])
         strange = [r for r in parsed(content)[1] if r not in known]
     except FormulaError:
         return words

@@ -88,7 +88,7 @@ def _formulas(exercise: Exercise, book: Book, addresses: CellAddresses) -> Itera
 
 def _same_text(found: Content | None, given: Content | None) -> bool:
     """Whether two cells hold one formula, as text, shared or not."""
-    if not (isinstance(found, Formula) and isinstance(given, Formula)) or found.array:
+    if not (isinstance(found, Formula) and isinstance(given, Formula)) or found.area:
         return False
     return found == given or relative_key(*found[:2]) == relative_key(*given[:2])
 

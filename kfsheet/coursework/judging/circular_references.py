@@ -2,55 +2,53 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from openpyxl.utils import get_column_letter
-from sympy import Indexed
 
-from kfsheet.coursework.judging.formula_meaning import Interpreter
-from kfsheet.coursework.judging.precise_values import cell_of
-from kfsheet.coursework.reading.cell_addresses import CellAddresses
-from kfsheet.errors import ForbiddenError, FormulaError
+from kfsheet.coursework.judging.formula_meaning import parsed
+from kfsheet.coursework.reading.cell_addresses import CellAddresses, find_sheet, named_cell
+from kfsheet.coursework.reading.submission import Book
+from kfsheet.coursework.reading.worksheet import Formula
+from kfsheet.errors import FormulaError
+from kfsheet.parsing.references import Address
 
-MOST = 500  # cells that are looked at
-
-Node = tuple[str, int]
-"""Name of a column and step, or of a derived scalar and 0."""
+MOST = 2_000  # cells that are looked at
+WIDEST = 200  # cells of a range that are
 
 
-def circular_reference(
-    interpreter: Interpreter, addresses: CellAddresses, name: str, step: int
-) -> list[str]:
+def circular_reference(book: Book, addresses: CellAddresses, name: str, step: int) -> list[str]:
     """Addresses from an answer back to itself; empty if there is no such circle."""
-    start: Node = (name, step)
+    start = addresses.of(name, step)
     paths, seen = [[start]], set()
-    while paths and len(seen) < MOST:
-        path = paths.pop()
-        for node in _read_by(interpreter, addresses, *path[-1]):
-            if node == start:
-                return [_address(addresses, n) for n in [*path, start]]
-            if node not in seen:
-                seen.add(node)
-                paths.append([*path, node])
+    while start and paths and len(seen) < MOST:
+        path = paths.pop(0)
+        for cell in _read_by(book, path[-1]):
+            if cell == start:
+                return [f"{get_column_letter(c)}{row}" for _, row, c in [*path, start]]
+            if cell not in seen:
+                seen.add(cell)
+                paths.append([*path, cell])
     return []
 
 
-def _address(addresses: CellAddresses, node: Node) -> str:
-    address = addresses.of(*node)
-    return f"{get_column_letter(address[2])}{address[1]}" if address else node[0]
-
-
-def _read_by(
-    interpreter: Interpreter, addresses: CellAddresses, name: str, step: int
-) -> list[Node]:
-    """What the formula in a cell reads: the student's, or the one that was given."""
-    address = addresses.of(name, step)
+def _read_by(book: Book, cell: Address) -> Iterator[Address]:
+    """What the text of a formula refers to, whatever its value makes of it."""
+    content = book.sheets[cell[0]].get(cell[1:])
+    if not isinstance(content, Formula):
+        return
     try:
-        meaning = address and interpreter.meaning(address, step)
-    except (FormulaError, ForbiddenError):
-        return []
-    if not meaning:
-        return []
-    model, e = interpreter.model, meaning.expression
-    scalars = {(s.name, 0) for s in e.free_symbols if s.name in model.derived_scalars}
-    read = map(cell_of, e.atoms(Indexed))
-    cells = {(column, place if fixed else step - place) for column, fixed, place in read}
-    return sorted(scalars | {n for n in cells if n[0] in model.table and 0 <= n[1] < model.rows})
+        found = parsed(content)[1]
+    except FormulaError:
+        return
+    for reference in found:
+        if reference.name:
+            if named := named_cell(book, reference.name):
+                yield named
+            continue
+        sheet = find_sheet(book, reference.sheet or cell[0])
+        try:
+            rows = reference.cells(cell[1:], WIDEST) if sheet in book.sheets else []
+        except FormulaError:
+            continue
+        yield from ((sheet, *place) for row in rows for place in row)

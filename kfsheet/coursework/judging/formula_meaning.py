@@ -25,12 +25,13 @@ from kfsheet.parsing.functions import as_number
 from kfsheet.parsing.references import Address, Reference, relative_key
 from kfsheet.parsing.syntax import Tree, parse_formula
 
-DANGEROUS = frozenset(
+DANGEROUS = sorted(
     "WEBSERVICE HYPERLINK INDIRECT DDE RTD CALL REGISTER.ID FILTERXML IMAGE IMPORTXML IMPORTDATA "
     "IMPORTHTML IMPORTRANGE IMPORTFEED CUBEVALUE EXEC SQL.REQUEST".split()
 )
-BEFORE_ARGUMENTS = re.compile(r"\s+\(")
+REACHES_OUT = re.compile(rf"(?<![\w.])(?:_XLFN\.)?({'|'.join(map(re.escape, DANGEROUS))})\s*\(")
 LINK = re.compile(r"\[\d+\]")
+DISTANCE = re.compile(r"\{[^{}]*\}")
 DEEPEST_HELPERS = 40  # helper cell upon helper cell
 LARGEST = 3_000  # nodes of an expression, helpers written out
 WIDEST = 64  # cells of a range that is no whole column
@@ -74,6 +75,17 @@ class Interpreter:
         except RecursionError:  # each formula is within limits, long helpers of helpers are not
             raise FormulaError("the formula with its helper cells is too deep to be read") from None
 
+    def shape(self, address: Address, step: int) -> Slot:
+        """The same for formulas that differ only in how far they are from what they refer to.
+
+        Raises
+        ------
+        FormulaError, ForbiddenError
+            As for ``meaning``.
+        """
+        _, key, slots = self._signature(address, self._content(address), step)
+        return (DISTANCE.sub("{}", key), slots)
+
     def _content(self, address: Address):
         sheet, *cell = address
         return self._book.sheets[sheet].get(tuple(cell))
@@ -81,7 +93,7 @@ class Interpreter:
     def _signature(self, address: Address, formula: Formula, step: int) -> Slot:
         if words := forbidden(formula.text):
             raise ForbiddenError(f"{words} is not allowed")
-        if formula.array:
+        if formula.area:
             raise FormulaError("an array formula is not read as mathematics")
         # Helper cells are the student's own: they may lead in a circle, or double at each step.
         if address in self._open:
@@ -161,9 +173,9 @@ class Interpreter:
 def forbidden(text: str) -> str | None:
     """What a formula uses that no answer may use, if there is such a thing."""
     # As text, before anything is parsed: also in a branch that is never taken, or in a string.
-    upper = BEFORE_ARGUMENTS.sub("(", text.upper())  # INDIRECT ("B8") is a call too
-    if found := next((name for name in DANGEROUS if f"{name}(" in upper), None):
-        return found
+    upper = text.upper()
+    if found := REACHES_OUT.search(upper):
+        return found[1]
     if LINK.search(text):
         return "a link to another file"
     return "DDE" if "|" in text and "!" in text else None

@@ -21,7 +21,11 @@ from kfsheet.workbook.engines.spreadsheet_engine import CellValue, Changes
 
 
 def calculated(
-    path: Path, trials: Sequence[Changes], cells: Sequence[Address], seconds: float
+    path: Path,
+    trials: Sequence[Changes],
+    cells: Sequence[Address],
+    seconds: float,
+    engine: str = "ironcalc",
 ) -> list[list[CellValue]]:
     """Values of some cells of a workbook, once for each set of numbers put in first.
 
@@ -30,7 +34,7 @@ def calculated(
     EngineError
         If the engine fails or takes longer than ``seconds``.
     """
-    asked = pickle.dumps((str(path), list(trials), list(cells)))
+    asked = pickle.dumps((str(path), list(trials), list(cells), engine))
     program = command("kfsheet.coursework.judging.recalculation_process", "main")
     try:
         done = subprocess.run(program, input=asked, capture_output=True, timeout=seconds)
@@ -43,10 +47,10 @@ def calculated(
 
 def main() -> int:
     """Calculate what standard input asks for."""
-    path, trials, cells = pickle.loads(sys.stdin.buffer.read())  # from calculated() above
+    path, trials, cells, name = pickle.loads(sys.stdin.buffer.read())  # from calculated() above
     pipe = answers()
     try:
-        engine = open_in(path)
+        engine = open_in(path, name)
         found = [engine.values(changes) for changes in trials]
     except KfsheetError:
         return 1

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import posixpath
+import re
 import zipfile
 import zlib
 from dataclasses import dataclass, field
@@ -36,6 +37,7 @@ LARGEST_FILE, LARGEST_PART, LARGEST_TOTAL = 30 * MEGABYTE, 100 * MEGABYTE, 200 *
 MOST_PARTS, MOST_SHEETS, MOST_NAMES = 500, 60, 5_000
 HIGHEST_RATIO = 400  # XML of a workbook shrinks 5 to 30 times, a bomb a thousand times
 OLE = bytes.fromhex("D0CF11E0A1B11AE1")
+WORKBOOK = re.compile(r"xl/workbook\w*\.xml", re.IGNORECASE)
 ENCRYPTED = "EncryptedPackage".encode("utf-16-le")
 
 
@@ -47,6 +49,9 @@ class Book:
     sheets: dict[str, dict[Cell, Content]] = field(default_factory=dict)
     parts: dict[str, str] = field(default_factory=dict)
     names: dict[str, str] = field(default_factory=dict)
+    sheet_names: dict[tuple[str, str], str] = field(default_factory=dict)
+    """Names that one worksheet has for itself, by worksheet and name."""
+
     properties: dict[str, str] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
 
@@ -107,8 +112,8 @@ def _read(archive: zipfile.ZipFile, digest: str) -> Book:
     book = Book(digest)
     if any("externallink" in name.lower() for name in parts.names):
         book.remarks.append("links to other files were not followed")
-    root = parts.tree("xl/workbook.xml")
-    links = parts.links("xl/workbook.xml")
+    start = parts.start()
+    root, links = parts.tree(start), parts.links(start)
     strings = _strings(parts, links)
     budget = Budget(MOST_CELLS)
     for sheet in _all(root, "sheet"):
@@ -119,9 +124,13 @@ def _read(archive: zipfile.ZipFile, digest: str) -> Book:
             name = sheet.get("name", "")
             book.parts[name] = target[0]
             book.sheets[name] = SheetReader(strings, budget).read(parts.read(target[0]))
+    titles = [sheet.get("name", "") for sheet in _all(root, "sheet")]
     for name in _all(root, "definedName")[:MOST_NAMES]:
-        if name.get("localSheetId") is None:
-            book.names[name.get("name", "").lower()] = name.text or ""
+        key, local = name.get("name", "").lower(), name.get("localSheetId")
+        if local is None:
+            book.names[key] = name.text or ""
+        elif local.isdecimal() and int(local) < len(titles):
+            book.sheet_names[titles[int(local)], key] = name.text or ""
     book.properties = _properties(parts)
     return book
 
@@ -152,7 +161,7 @@ def _check_parts(archive: zipfile.ZipFile) -> None:
     if "content.xml" in names and "mimetype" in names:
         words = "this is an OpenDocument file; save it as .xlsx, Excel's format"
         raise SubmissionError("wrong kind", words)
-    if "xl/workbook.xml" not in names:
+    if not any(WORKBOOK.fullmatch(name.replace("\\", "/")) for name in names):
         words = "the file is a zip, but no Excel workbook; if it holds submissions, unpack it first"
         raise SubmissionError("wrong kind", words)
 
@@ -162,15 +171,25 @@ class _Parts:
 
     def __init__(self, archive: zipfile.ZipFile) -> None:
         self._archive = archive
-        self.names = set(archive.namelist())
+        # Some programs write xl\\workbook.xml, or other capitals: OPC has it that these are equal.
+        self._names = {_plain(name): name for name in archive.namelist()}
+        self.names = set(self._names)
 
     def read(self, name: str) -> bytes:
         # The directory's size is the sender's word; only what comes out counts.
-        with self._archive.open(name) as part:
+        with self._archive.open(self._names[_plain(name)]) as part:
             content = part.read(LARGEST_PART + 1)
         if len(content) > LARGEST_PART:
             raise SubmissionError("too large", f"{name} unpacks to more than the limit")
         return content
+
+    def start(self) -> str:
+        """The part that holds the workbook, xl/workbook.xml by habit only."""
+        for target, kind in self.links("").values():
+            part = target.removeprefix("/")
+            if kind.endswith("/officeDocument") and _plain(part) in self.names:
+                return part
+        return "xl/workbook.xml"
 
     def tree(self, name: str) -> Element:
         return ElementTree.fromstring(self.read(name), forbid_dtd=True)
@@ -178,7 +197,12 @@ class _Parts:
     def links(self, name: str) -> dict[str, tuple[str, str]]:
         """Target and type by relationship id; targets outside the file are left out."""
         folder, base = posixpath.split(name)
-        return relations(self.tree(f"{folder}/_rels/{base}.rels"), folder)
+        part = posixpath.join(folder, "_rels", f"{base}.rels")
+        return relations(self.tree(part), folder) if _plain(part) in self.names else {}
+
+
+def _plain(name: str) -> str:
+    return name.replace("\\", "/").lower()
 
 
 def _all(root: Element, tag: str) -> list[Element]:
@@ -193,7 +217,7 @@ def _attribute(element: Element, name: str) -> str:
 
 def _strings(parts: _Parts, links: dict[str, tuple[str, str]]) -> list[str]:
     for target, kind in links.values():
-        if kind.endswith("/sharedStrings") and target in parts.names:
+        if kind.endswith("/sharedStrings") and _plain(target) in parts.names:
             return [_text(item) for item in _all(parts.tree(target), "si")]
     return []
 
@@ -204,5 +228,5 @@ def _text(item: Element) -> str:
 
 
 def _properties(parts: _Parts) -> dict[str, str]:
-    found = properties(parts.tree(CUSTOM)) if CUSTOM in parts.names else {}
+    found = properties(parts.tree(CUSTOM)) if _plain(CUSTOM) in parts.names else {}
     return {name: text[:LONGEST_TEXT] for name, text in found.items()}

@@ -3,29 +3,18 @@
 from __future__ import annotations
 
 import re
-from typing import NamedTuple
 from xml.parsers import expat
 
-from openpyxl.utils import column_index_from_string
+from openpyxl.utils import column_index_from_string, range_boundaries
 
 from kfsheet.errors import SubmissionError
+from kfsheet.parsing.calculator import Content, Formula
 from kfsheet.parsing.references import Cell
 from kfsheet.printing.excel_names import LAST_COLUMN, LAST_ROW
 
 MOST_CELLS = 400_000  # of a submission
 LONGEST_TEXT = 40_000  # characters in a cell; Excel's limit is 32,767
 PLACE = re.compile(r"([A-Z]{1,3})([1-9]\d{0,6})")
-
-
-class Formula(NamedTuple):
-    """A formula, and the cell in which its text stands (another one where it is shared)."""
-
-    text: str
-    host: Cell
-    array: bool = False
-
-
-Content = Formula | float | bool | str
 
 
 class Budget:
@@ -114,7 +103,18 @@ class SheetReader:
             if text:
                 self._shared[number] = Formula(f"={text}", self._at)
             return self._shared.get(number)
-        return Formula(f"={text}", self._at, kind in ("array", "dataTable")) if text else None
+        if not text:
+            return None
+        array = kind in ("array", "dataTable")
+        return Formula(f"={text}", self._at, self._area() if array else None)
+
+    def _area(self) -> tuple[int, int, int, int]:
+        """The cells that an array formula fills, its own one at least."""
+        try:
+            left, top, right, bottom = range_boundaries(self._attributes.get("ref", ""))
+        except (ValueError, TypeError):
+            return (*self._at, *self._at)
+        return (top, left, bottom, right) if (top, left) == self._at else (*self._at, *self._at)
 
     def _close(self) -> None:
         content: Content | None = self._formula

@@ -26,6 +26,7 @@ from kfsheet.coursework.handout.own_numbers import own_numbers
 from kfsheet.coursework.judging.changed_cells import changed_cells
 from kfsheet.coursework.judging.diagnosis import EMPTY
 from kfsheet.coursework.judging.judge import Judge, Mark
+from kfsheet.coursework.judging.model_runs import ModelRuns
 from kfsheet.coursework.judging.random_samples import OwnNumbers, Sampler
 from kfsheet.coursework.judging.recalculated_answers import Recalculation
 from kfsheet.coursework.reading.cell_addresses import named_cell
@@ -70,10 +71,10 @@ class Assessment:
 
 
 @lru_cache(maxsize=4)
-def prepared(spec: str) -> tuple[Exercise, Sampler]:
-    """An exercise and its random points, made once in a process."""
+def prepared(spec: str) -> tuple[ModelRuns, Sampler]:
+    """An exercise with its worlds and its random points, made once in a process."""
     exercise = load_exercise(spec)
-    return exercise, Sampler(exercise.model)
+    return ModelRuns(exercise), Sampler(exercise.model)
 
 
 def assess(spec: str, secret: bytes, path: Path, copy: Path | None = None) -> Assessment:
@@ -90,13 +91,14 @@ def assess(spec: str, secret: bytes, path: Path, copy: Path | None = None) -> As
     copy : Path, optional
         Where the marked copy of the workbook goes.
     """
-    exercise, sampler = prepared(spec)
+    runs, sampler = prepared(spec)
+    exercise = runs.exercise
     try:
         book = read_submission(path)
         student = _student(book, exercise, secret)
         own = own_numbers(exercise, secret, student)
-        recalculation = Recalculation(path, sampler)
-        judge = Judge(exercise, sampler, book, own, recalculation)
+        recalculation = Recalculation(path, runs)
+        judge = Judge(runs, sampler, book, own, recalculation)
         marks = judge.marks()
         if all(mark.status == EMPTY for mark in marks):
             return Assessment(UNTOUCHED, "no answer was filled in", student, marks)
@@ -113,9 +115,12 @@ def _student(book: Book, exercise: Exercise, secret: bytes) -> str:
     # Two places hold it: what loses one, a program or a copied sheet, mostly keeps the other.
     address = named_cell(book, TOKEN_NAME)
     cell = book.sheets[address[0]].get(address[1:]) if address else None
+    texts = [cell, book.properties.get(TOKEN_PROPERTY)]
+    if not any(isinstance(text, str) for text in texts):  # a program that drops names keeps cells
+        texts = [text for cells in book.sheets.values() for text in cells.values()]
     found = [
         token
-        for text in (cell, book.properties.get(TOKEN_PROPERTY))
+        for text in texts
         if isinstance(text, str) and (token := course_secret.read_token(secret, text))
     ]
     if not found:

@@ -317,4 +317,5 @@ exercise = Exercise(
     # u and w of the next step, and what holds the denominator of the gains.
     veiled=("u_next", "w_next", "sigma_d_i", "sigma_d_j", "p_x", "p_z"),
     draw=draw_kick,
+    ranges={"i": (0, 2000), "j": (0, 2000)},  # pixels of a photo
 )

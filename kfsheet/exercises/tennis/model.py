@@ -229,6 +229,7 @@ def exercise_of(model: Recurrence, shot: Shot) -> Exercise:
         alarm=("ball_fits", "landed"),
         vary={"sigma_px": (0.15, 0.3), "s_x": (0.08, 0.15), "s_v": (0.8, 1.5)},
         draw=photographed_again,
+        ranges=dict.fromkeys(("u1", "v1", "u2", "v2"), (0, 2000)),  # pixels of an image
         sealed=("Triangulation", "Kalman filter", "Flight"),
     )
 
