@@ -12,15 +12,15 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.random import RandomState
 
-from kfsheet.coursework.judging.random_samples import OwnNumbers
-from kfsheet.errors import DataError
+from kfsheet.errors import DataError, KfsheetError
 from kfsheet.model.exercise import Exercise
 from kfsheet.model.expressions import columns_read
 from kfsheet.model.quantities import Column
@@ -39,6 +39,14 @@ LARGEST = 1e8  # times the model's own values: beyond, a run says nothing
 Values = Mapping[str, Sequence[float]]
 
 
+@dataclass(frozen=True)
+class OwnNumbers:
+    """A student's own parameters and data."""
+
+    parameters: tuple[tuple[str, float], ...] = ()
+    data: tuple[tuple[str, tuple[float, ...]], ...] = ()
+
+
 @dataclass(frozen=True, eq=False)
 class World:
     """One run, and what is special in it."""
@@ -51,15 +59,17 @@ class World:
     own: bool = False
     """Whether parameters are the student's own."""
     own_data: bool = False
-    known: dict[tuple, dict] = field(default_factory=dict, repr=False)
+    known: dict[Hashable, Any] = field(default_factory=dict, repr=False)
     """The cells of a workbook in this world, by where they stand."""
 
-    def cells(self, name: str) -> list[float | str | None]:
-        """What the cells of a column hold: EMPTY without a datum, "" without a value."""
+    def cell(self, name: str, step: int = 0) -> float | str | None:
+        """What a cell of a column or scalar holds: EMPTY without a datum, "" without a value."""
         if name == "t":
-            return [float(n) for n in range(len(next(iter(self.columns.values()))))]
-        gap = EMPTY if name in self.data else ""
-        return [gap if math.isnan(v) else float(v) for v in self.columns[name]]
+            return float(step)
+        value = self.scalars[name] if name in self.scalars else self.columns[name][step]
+        if math.isnan(value):
+            return EMPTY if name in self.data else ""
+        return float(value)
 
     @cached_property
     def sizes(self) -> dict[str, float]:
@@ -103,6 +113,15 @@ class ModelRuns:
                 continue  # what is not observed, or others' data, need not suit these parameters
             found.append(self._world(run, values, True, own_data))
         return tuple(found)
+
+    def own_world(self, own: OwnNumbers, changed: Mapping[str, float]) -> World | None:
+        """A student's own numbers with some parameters changed; None if nothing comes of them."""
+        data = {n: list(v) for n, v in own.data}
+        try:
+            run = Run.of(self.model, data, {**dict(own.parameters), **changed})
+        except KfsheetError:
+            return None
+        return self._world(run, data, True, True)
 
     def _world(self, run: Run, data: Values, own: bool = False, own_data: bool = False) -> World:
         gaps = any(math.isnan(v) for c in self._observed for v in data[c.name])
