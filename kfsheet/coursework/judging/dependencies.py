@@ -40,11 +40,9 @@ def _delay(item: Column | Scalar, rule: Basic, found: dict[str, float]) -> float
 def _ways(item: Column | Scalar, rule: Basic, found: dict[str, float]) -> Iterator[float]:
     if any(symbol.name in found for symbol in scalars(rule)):
         yield -inf
-    cells = column_references(rule)
-    for cell in cells:
+    for cell in column_references(rule):
         if (before := found.get(str(cell.base.label))) is not None:
-            back = lag(cell)
-            yield before + int(back) if back.is_Integer else -inf
+            yield before + int(lag(cell))
     if isinstance(item, Scalar) and found.keys() & columns_read(rule):
         yield -inf  # a sum over a column follows from every row of it
 

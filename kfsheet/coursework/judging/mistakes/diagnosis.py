@@ -143,8 +143,14 @@ def _worth(outcomes: Sequence[Outcome]) -> str:
     seen = [o for o in outcomes if not o.world.gaps and o.wanted != ""]
     if _right(seen):
         return GAPS
-    close = [same(o.found, o.wanted, tolerance=ROUGH) for o in seen]
-    return NEARLY if 4 * sum(close) > 3 * len(close) else WRONG
+    # Also in the student's own sheet, where a formula may be wrong that is right elsewhere.
+    own = [o for o in seen if o.world.own_data]
+    return NEARLY if _mostly_close(seen) and _mostly_close(own) else WRONG
+
+
+def _mostly_close(outcomes: Sequence[Outcome]) -> bool:
+    close = [same(o.found, o.wanted, tolerance=ROUGH) for o in outcomes]
+    return 4 * sum(close) > 3 * len(close)
 
 
 def _is_typed(outcomes: Sequence[Outcome]) -> bool:
