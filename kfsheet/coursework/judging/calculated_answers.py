@@ -79,13 +79,15 @@ class CalculatedAnswers:
         found = self._sheet(world).formula_value(address, formula)
         return Outcome(found, wanted, same(found, wanted, world.sizes.get(name, 0.0)), world)
 
-    def reads(self, chosen: Chosen, address: Address) -> bool:
-        """Whether the formula in a cell needs one of the cells of the model that are chosen."""
+    def needs(self, chosen: Chosen, address: Address) -> bool:
+        """Whether a formula gives something else if the cells that are chosen are errors.
+
+        An error that is swallowed, by ISNUMBER say, shows as well as one that comes through.
+        """
         cells = self._cells(self._own)
-        spoilt = {
-            sheet: _Spoilt(self._addresses, sheet, chosen, cells[sheet]) for sheet in cells
-        }  # fmt: skip
-        return self._base.with_values(spoilt).formula_value(address) is Error.CIRC
+        spoilt = {name: _Spoilt(self._addresses, name, chosen, cells[name]) for name in cells}
+        found = self._base.with_values(spoilt).formula_value(address)
+        return not same(found, self._sheet(self._own).formula_value(address))
 
     def works(self, name: str, step: int, address: Address) -> bool:
         """Whether a cell, calculated in the student's own file, has the key's value."""
@@ -124,7 +126,7 @@ class _WorldCells(dict[Cell, Value]):
 
 
 class _Spoilt(dict[Cell, Value]):
-    """The same with an error in the cells that are chosen, to see who needs them."""
+    """The same with errors in the cells that are chosen, to see who needs them."""
 
     def __init__(
         self, addresses: CellAddresses, sheet: str, chosen: Chosen, cells: Mapping[Cell, Value]

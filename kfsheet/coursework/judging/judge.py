@@ -206,7 +206,7 @@ class Judge:
         def follows(other: str, step: int) -> bool:
             return step - cell.step >= after.get(other, inf)
 
-        if not self.calculated.reads(follows, cell.address):
+        if not self.calculated.needs(follows, cell.address):
             return ""
         # Who reads the analysis for the innovation may have written the analysis without it.
         if self.calculated.works(name, cell.step, cell.address):
@@ -221,7 +221,7 @@ class Judge:
         for veiled in self._exercise.veiled:
             if veiled in ancestors(self._model, name):
                 continue
-            if self.calculated.reads(lambda other, _, v=veiled: other == v, cell.address):
+            if self.calculated.needs(lambda other, _, v=veiled: other == v, cell.address):
                 return f"{veiled} repeats the answer; derive it"
         return ""
 

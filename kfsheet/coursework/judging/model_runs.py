@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Container, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -22,7 +22,7 @@ from numpy.random import RandomState
 
 from kfsheet.errors import DataError, KfsheetError
 from kfsheet.model.exercise import Exercise
-from kfsheet.model.expressions import columns_read
+from kfsheet.model.expressions import Missing, columns_read
 from kfsheet.model.quantities import Column
 from kfsheet.parsing.calculator import EMPTY
 from kfsheet.workbook.write.run import Run
@@ -53,7 +53,9 @@ class World:
 
     columns: Mapping[str, Sequence[float]]
     scalars: Mapping[str, float]
-    data: frozenset[str]
+    empty: Mapping[str, Container[int]]
+    """Rows of a column that hold nothing where there is no value: those of data, and a start that
+    has none. In other rows a formula stands, which gives an empty text."""
     gaps: bool = False
     """Whether observations are missing."""
     own: bool = False
@@ -68,7 +70,7 @@ class World:
             return float(step)
         value = self.scalars[name] if name in self.scalars else self.columns[name][step]
         if math.isnan(value):
-            return EMPTY if name in self.data else ""
+            return EMPTY if step in self.empty.get(name, ()) else ""
         return float(value)
 
     @cached_property
@@ -126,7 +128,15 @@ class ModelRuns:
     def _world(self, run: Run, data: Values, own: bool = False, own_data: bool = False) -> World:
         gaps = any(math.isnan(v) for c in self._observed for v in data[c.name])
         columns = {**run.columns, **self._frozen}
-        return World(columns, run.scalars, self._names, gaps, own, own_data)
+        return World(columns, run.scalars, self._empty, gaps, own, own_data)
+
+    @cached_property
+    def _empty(self) -> dict[str, Container[int]]:
+        found: dict[str, Container[int]] = {name: range(self.model.rows) for name in self._names}
+        for column in self.model.all_columns():
+            if hollow := {k for k, rule in enumerate(column.start) if rule is Missing}:
+                found[column.name] = hollow
+        return found
 
     @cached_property
     def _frozen(self) -> dict[str, Sequence[float]]:
