@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import inf
@@ -37,8 +37,13 @@ from kfsheet.coursework.judging.mistakes.diagnosis import (
     digest_of,
 )
 from kfsheet.coursework.judging.mistakes.known_mistakes import KnownMistakes
-from kfsheet.coursework.judging.model_runs import ModelRuns, OwnNumbers
-from kfsheet.coursework.judging.precedents import circle_in_words, forbidden_precedent
+from kfsheet.coursework.judging.model_runs import ModelRuns, OwnNumbers, World
+from kfsheet.coursework.judging.precedents import (
+    circle_in_words,
+    forbidden_precedent,
+    own_cells,
+    precedents,
+)
 from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.coursework.reading.formula_text import forbidden
 from kfsheet.coursework.reading.submission import Book
@@ -56,6 +61,7 @@ FORMULA = "formula"  # a cell that is not judged yet
 UNKNOWN = re.compile(r"the function (\S+) is not known")
 GIVEN_UP = "given up: "
 FEW = 40  # rows of one formula that are all calculated; of more, those at which something changes
+OWN = 2  # worlds in which all rows are: the student's own numbers, and half of the observations
 
 
 @dataclass(frozen=True)
@@ -142,10 +148,8 @@ class Judge:
         """The cells of one formula, judged."""
         looked = self._looked_at(name, group)
         found = [self._calculate(name, cell) for cell in looked]
-        statuses = {cell.status for cell in found}
-        if len(looked) < len(group) and len(statuses) > 1:
-            known = {cell.step: cell for cell in found}
-            found = [known.get(c.step) or self._calculate(name, c) for c in group]
+        if len(looked) < len(group):
+            found = self._with_the_rest(name, group, found)
         if _only_gaps(found):
             found = [replace(cell, status=WRONG) for cell in found]
         right = [cell for cell in found if cell.status == RIGHT]
@@ -157,6 +161,20 @@ class Judge:
             if cell.step not in steps:
                 yield replace(cell, status=found[0].status, words=found[0].words)
 
+    def _with_the_rest(
+        self, name: str, group: list[AnswerCell], found: list[AnswerCell]
+    ) -> list[AnswerCell]:
+        """Those of which some were found alike, and all others that may differ."""
+        known = {cell.step: cell for cell in found}
+        others = [cell for cell in group if cell.step not in known]
+        statuses = {cell.status for cell in found}
+        if statuses == {RIGHT}:  # every row as the student sees it, with and without observations
+            own = self.calculated.worlds[:OWN]
+            others = [c for c in others if self._calculate(name, c, own).status != RIGHT]
+        elif len(statuses) == 1:
+            others = []
+        return found + [self._calculate(name, cell) for cell in others]
+
     def _looked_at(self, name: str, group: list[AnswerCell]) -> list[AnswerCell]:
         if len(group) <= FEW:
             return group
@@ -167,10 +185,12 @@ class Judge:
         at |= {n + more for n in changes for more in (0, 1)}
         return [group[n] for n in sorted(at)]
 
-    def _calculate(self, name: str, cell: AnswerCell) -> AnswerCell:
+    def _calculate(
+        self, name: str, cell: AnswerCell, worlds: Sequence[World] | None = None
+    ) -> AnswerCell:
         try:
             with time_limit(SECONDS):
-                outcomes = tuple(self.calculated.outcomes(name, cell.step, cell.address))
+                outcomes = tuple(self.calculated.outcomes(name, cell.step, cell.address, worlds))
         except OutOfTimeError:
             return replace(cell, status=UNREADABLE, words=f"{GIVEN_UP}calculating takes too long")
         except ForbiddenError as error:
@@ -192,21 +212,25 @@ class Judge:
 
     def _not_its_own(self, name: str, right: list[AnswerCell]) -> str:
         """Words, if an answer with the right values is computed from itself, or copied."""
-        try:
-            for cell in {right[0].step: right[0], right[-1].step: right[-1]}.values():
-                if words := self._circle(name, cell):
-                    return words
-            return self._repeats(name, right[0])
-        except KfsheetError:
-            return ""
+        ends = {right[0].step: right[0], right[-1].step: right[-1]}.values()
+        for cell in right if any(self._mentions_itself(name, cell) for cell in ends) else ends:
+            if words := self._circle(name, cell):
+                return words
+        return self._repeats(name, right[0])
+
+    def _follows(self, name: str, cell: AnswerCell) -> Callable[[str, int], bool]:
+        after = delays(self._model, name)
+        return lambda other, step: step - cell.step >= after.get(other, inf)
+
+    def _mentions_itself(self, name: str, cell: AnswerCell) -> bool:
+        """Whether the text of a formula names a cell that follows from it, used or not."""
+        follows = self._follows(name, cell)
+        own = own_cells(self.book, self.addresses, cell.address)
+        roles = (self.addresses.role(c) for o in own for c in precedents(self.book, o))
+        return any(follows(*((r, 0) if isinstance(r, str) else r)) for r in roles if r)
 
     def _circle(self, name: str, cell: AnswerCell) -> str:
-        after = delays(self._model, name)
-
-        def follows(other: str, step: int) -> bool:
-            return step - cell.step >= after.get(other, inf)
-
-        if not self.calculated.needs(follows, cell.address):
+        if not self.calculated.needs(self._follows(name, cell), cell.address):
             return ""
         # Who reads the analysis for the innovation may have written the analysis without it.
         if self.calculated.works(name, cell.step, cell.address):
