@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from kfsheet.errors import ModelError
 from kfsheet.model.chart import Chart
+from kfsheet.model.expressions import columns_read, scalars
 from kfsheet.model.recurrence import Recurrence
 
 if TYPE_CHECKING:
@@ -165,3 +167,21 @@ class Exercise:
     def title(self) -> str:
         """One line for people."""
         return self.model.title
+
+    @cached_property
+    def waiting(self) -> frozenset[str]:
+        """What has no value in a handout before answers are there: they, and what needs them."""
+        model = self.model
+        fixed = {c.name for c in model.table.values() if c.is_data or c.section in self.frozen}
+        rules = {c.name: c.rules for c in model.all_columns() if c.name not in fixed}
+        rules |= {s.name: s.rules for s in (model.derived_scalars | model.summaries).values()}
+        reads = {
+            name: {r for rule in those for r in (*columns_read(rule), *map(str, scalars(rule)))}
+            for name, those in rules.items()
+        }
+        found: set[str] = set()
+        new = {question.name for question in self.questions}
+        while new:
+            found |= new
+            new = {n for n, read in reads.items() if read & found} - found
+        return frozenset(found)

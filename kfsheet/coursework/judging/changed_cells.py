@@ -113,7 +113,7 @@ _originals: dict[str, _Original] = {}
 
 def _original(exercise: Exercise) -> _Original:
     if exercise.name not in _originals:
-        layout = Layout.standard(exercise.model)
+        layout = Layout.standard(exercise.model, exercise.waiting)
         book = Book("")
         now = Run.of(exercise.model)
         for page in (section_sheet(layout, section, now) for section in exercise.model.sections):
