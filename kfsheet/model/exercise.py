@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -47,7 +48,8 @@ class Exercise:
     model : Recurrence
         The filter; its name is the name of the exercise and of its workbook.
     about : tuple of str
-        Paragraphs for the sheet "Read me": the story, and what to try.
+        Paragraphs for the sheet "Read me": the story, and what to try. ``{r_i}`` stands for the
+        value of a parameter, which in a handout is the student's own.
     source : str
         Where the exercise comes from.
     charts : tuple of Chart
@@ -167,6 +169,15 @@ class Exercise:
     def title(self) -> str:
         """One line for people."""
         return self.model.title
+
+    def story(self, values: Mapping[str, float]) -> tuple[str, ...]:
+        """The paragraphs of ``about`` with the values of a run's parameters in them."""
+
+        def value(match: re.Match[str]) -> str:
+            name = match[1]
+            return f"{values[name]:.10g}" if name in self.model.parameters else match[0]
+
+        return tuple(re.sub(r"\{(\w+)\}", value, paragraph) for paragraph in self.about)
 
     @cached_property
     def waiting(self) -> frozenset[str]:

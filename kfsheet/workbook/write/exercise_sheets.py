@@ -198,12 +198,12 @@ def chart_range(exercise: Exercise, layout: Layout, name: str, where: str = "") 
 CHARACTERS_A_LINE = 130  # of the two columns of "Read me" together
 
 
-def readme_sheet(exercise: Exercise, layout: Layout) -> Sheet:
+def readme_sheet(exercise: Exercise, built: Run) -> Sheet:
     """The first worksheet: what this is, how to use it, what the colours mean."""
     sheet = Sheet("Read me", widths={1: 22, 2: 100})
     sheet.put(1, 1, exercise.title, "title")
     row = 3
-    for paragraph in exercise.about:
+    for paragraph in exercise.story(built.scalars):
         sheet.put(row, 1, Words(paragraph), "text", align="wrap")
         sheet.merges.append(f"A{row}:B{row}")
         sheet.heights[row] = 16 * (1 + len(paragraph) // CHARACTERS_A_LINE) + 4
