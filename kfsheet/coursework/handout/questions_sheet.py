@@ -18,16 +18,17 @@ SHEET = "Questions"
 FIRST, FEEDBACK_COLUMN = 7, "F"
 LOOKS_RIGHT, NOT_YET, EMPTY = "looks right", "not yet", "empty"
 WAITS, DIFFERS = "waits for", "differs in"
-HEADS = ("answer", "points", "where", "what to do", "filled in")
+FILLED_IN = "filled in"  # the head to the left of the feedback
+HEADS = ("answer", "points", "where", "what to do", FILLED_IN)
 WIDTHS = {1: 14, 2: 8, 3: 26, 4: 62, 5: 14, 6: 46}
 CHARACTERS_A_LINE = 180  # of the columns together, in a wide font
 HOW = (
     "Fill in the orange cells on the sheets named below: a formula in each, from top to bottom. "
-    "Everything that follows from them is live, charts too; it is empty until what it needs is "
-    "there. Helper cells may stand anywhere beside the tables. A formula must follow when a "
-    "parameter or a measurement changes: type no number that stands in a cell. Where there is no "
-    'value, a formula gives the empty text "", as the others do; ISNUMBER tells whether there is '
-    "one."
+    "What follows from them is live, charts too, and empty until what it needs is there; so long "
+    "a formula of yours that reads it may show an error. Helper cells may stand anywhere beside "
+    "the tables. A formula must follow when a parameter or a measurement changes: type no number "
+    'that stands in a cell. Where there is no value, a formula gives the empty text "", as the '
+    "others do; ISNUMBER tells whether there is one."
 )
 FEEDBACK = (
     "Values are looked at from the first row on, with your own numbers. 'Right up to ... 3; waits "

@@ -17,7 +17,13 @@ from itertools import pairwise
 from openpyxl.utils import FORMULAE
 
 from kfsheet.coursework.judging.answer_key import asked_steps
-from kfsheet.coursework.judging.answer_rows import AnswerCell, content_of, not_in, rows_of
+from kfsheet.coursework.judging.answer_rows import (
+    AnswerCell,
+    content_of,
+    looked_at,
+    not_in,
+    rows_of,
+)
 from kfsheet.coursework.judging.calculated_answers import CalculatedAnswers
 from kfsheet.coursework.judging.circular_references import circular_reference
 from kfsheet.coursework.judging.diagnosis import (
@@ -67,6 +73,14 @@ class Mark:
     status: str
     remark: str
     fingerprint: str = ""
+    step: int = 0
+    """The first step that is not right; of a right answer, one of those that are alike."""
+
+    formula: str = ""
+    """What stands in that step."""
+
+    differs: str = ""
+    """The cell of that step, if it is not right."""
 
 
 Recalculated = Callable[[CellAddresses, str], dict[int, bool]]
@@ -108,7 +122,8 @@ class Judge:
         if any(_may_be_known(cell) for cell in cells):
             found = self._recalculated(self.addresses, asked.name)
             cells = [_decided(cell, found) for cell in cells]
-        return self._marked(asked, cells)
+        first = next((cell for cell in cells if cell.status != RIGHT), None)
+        return replace(self._marked(asked, cells), **looked_at(self.book, cells, first))
 
     def _found(self, name: str, step: int) -> AnswerCell | None:
         """What stands in a cell, by its kind."""
