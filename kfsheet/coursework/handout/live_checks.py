@@ -2,8 +2,9 @@
 
 Below stands the grid: a line for a step, or for a block of steps of a long table, and for each
 answer what is kept of the right value (:mod:`kfsheet.coursework.handout.check_numbers`), in a block
-the weighted sum of its cells, and 1 or 0. Above it stands, in a line for each answer, what follows:
-the last step that is right, the first that is not, and which other answer it waits for.
+the weighted sum of its cells, and 1 or 0. Below the grid of a long table the steps of the first
+block that is not right are looked at one by one. Above it stands, in a line for each answer, what
+follows: the last step that is right, the first that is not, and which other answer it waits for.
 """
 
 from __future__ import annotations
@@ -24,9 +25,7 @@ from kfsheet.workbook.write.run import Run
 from kfsheet.workbook.write.sheet import Sheet
 
 HIDDEN = "kfsheet"
-HEADS = (
-    "answer filled failed done last next to asked reach who begin end".split()  # see _put_lines
-)
+HEADS = "answer filled failed done block inside next to last asked reach who begin end".split()
 FACTOR, WINDOW = "$B$1", "$C$1"
 FIRST_LINE, FIRST_COLUMN, A_CHECK = 3, 3, 3
 
@@ -97,6 +96,8 @@ class LiveChecks:
         self._weights = check_numbers.weights(secret, exercise.name, self._rows)
         self._grid = FIRST_LINE + len(asked) + 2
         self._at_weights = FIRST_COLUMN + A_CHECK * len(asked)
+        self._long = any(steps.first < steps.last for steps in self._steps)
+        self._detail = self._grid + len(self._steps) + 1
         self.sheet = Sheet(HIDDEN)
         self.sheet.put(1, 1, course_secret.token(secret, exercise.name, student), "index")
         self.sheet.names[TOKEN_NAME] = (1, 1)
@@ -118,7 +119,7 @@ class LiveChecks:
         for row, steps in enumerate(self._steps, self._grid):
             self.sheet.put(row, 1, steps.first, "index")
             self.sheet.put(row, 2, steps.last, "index")
-        if any(steps.first < steps.last for steps in self._steps):
+        if self._long:
             for step, weight in enumerate(self._weights):
                 self.sheet.put(self._grid + step, self._at_weights, weight, "index")
         for number, answer in enumerate(self._answers):
@@ -133,6 +134,8 @@ class LiveChecks:
                     self._put_row(row, at, answer, those[0], sizes)
                 else:
                     self._put_block(row, at, answer, Steps(those[0], those[-1]), sizes)
+            if self._long and answer.step:
+                self._put_detail(number, at, answer, sizes)
 
     def _checked(self, answer: Answer) -> list[Steps]:
         return self._steps if answer.step else self._steps[:1]
@@ -166,6 +169,27 @@ class LiveChecks:
         full = f"AND(COUNT({cells})={len(known)},COUNTA({cells})=ROWS({cells}),ISNUMBER({summed}))"
         self.sheet.put(row, at + 2, f"=IF({full},{self._passes(summed, row, at)},0)", "formula")
 
+    def _put_detail(self, number: int, at: int, answer: Answer, sizes: list[float]) -> None:
+        """Some steps one by one, from the first of the first block that is not right."""
+        column = self._at_weights + 1 + number
+        for step, (value, size) in enumerate(zip(answer.values, sizes, strict=True)):
+            if not isnan(value):
+                kept = check_numbers.salt(value, size, self._own)
+                self.sheet.put(self._grid + step, column, kept, "index")
+        letter = get_column_letter(column)
+        all_kept = f"${letter}${self._grid}:${letter}${self._grid + self._rows - 1}"
+        cells, flag = answer.cells(Steps(0, self._rows - 1)), at + 2
+        for row in range(self._detail, self._detail + check_numbers.ROWS_A_BLOCK):
+            place, kept = f"{get_column_letter(at + 1)}{row}", f"{get_column_letter(at)}{row}"
+            nth = f"{self._line(number, 'block')}+{row - self._detail}"
+            self.sheet.put(row, at + 1, f"=MIN({nth},{self._rows - 1})+1", "formula")
+            text = f'=IF(ISNUMBER(INDEX({all_kept},{place})),INDEX({all_kept},{place}),"")'
+            self.sheet.put(row, at, text, "formula")
+            cell = f"INDEX({cells},{place})"
+            gap = f"IF(ISTEXT({cell}),IF(LEN({cell})=0,1,0),0)"
+            value = f"IF(ISNUMBER({cell}),{self._passes(cell, row, at)},0)"
+            self.sheet.put(row, flag, f"=IF(ISNUMBER({kept}),{value},{gap})", "formula")
+
     @staticmethod
     def _passes(cell: str, row: int, at: int) -> str:
         """1 or 0; see :func:`kfsheet.coursework.handout.check_numbers.looks_right`."""
@@ -198,20 +222,25 @@ class LiveChecks:
     def _limit_column(self, number: int) -> int:
         return len(HEADS) + 1 + number
 
-    def _progress(self, number: int, answer: Answer) -> dict[str, str]:
+    def _progress(self, number: int, answer: Answer) -> dict[str, str | int]:
         last_row = self._grid + len(self._checked(answer)) - 1
+        flag = get_column_letter(FIRST_COLUMN + A_CHECK * number + 2)
         flags, first, last = (
-            f"${letter}${self._grid}:${letter}${last_row}"
-            for letter in (get_column_letter(FIRST_COLUMN + A_CHECK * number + 2), "A", "B")
+            f"${letter}${self._grid}:${letter}${last_row}" for letter in (flag, "A", "B")
         )
-        failed, done = self._line(number, "failed"), self._line(number, "done")
+        failed, done, block, inside, next_ = (
+            self._line(number, what) for what in ("failed", "done", "block", "inside", "next")
+        )
+        detail = f"${flag}${self._detail}:${flag}${self._detail + check_numbers.ROWS_A_BLOCK - 1}"
         limits = self._limits(number, FIRST_LINE + number)
         return {
             "failed": f"=IFERROR(MATCH(0,{flags},0),ROWS({flags})+1)",
             "done": f"=IF({failed}>ROWS({flags}),1,0)",
-            "last": f"=IF({failed}=1,-1,INDEX({last},{failed}-1))",
-            "next": f"=IF({done}=1,{self._rows},INDEX({first},{failed}))",
-            "to": f"=IF({done}=1,{self._rows},INDEX({last},{failed}))",
+            "block": f"=IF({done}=1,{self._rows},INDEX({first},{failed}))",
+            "inside": f"=IFERROR(MATCH(0,{detail},0),0)" if self._long and answer.step else 1,
+            "next": f"=IF({done}=1,{self._rows},{block}+MAX({inside}-1,0))",
+            "to": f"=IF(AND({done}=0,{inside}=0),INDEX({last},{failed}),{next_})",
+            "last": f"={next_}-1",
             "reach": f"=IF(COUNT({limits})=0,{self._rows},MIN({limits}))",
         }
 
