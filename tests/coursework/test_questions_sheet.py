@@ -126,11 +126,11 @@ def test_a_value_where_there_is_none_differs(tmp_path):
     sheet = paper("football").open(tmp_path / "a.xlsx").answer_all()
     gap = next(n for n, v in enumerate(answers_of("football")["d_i"]) if n and isnan(v))
     cell = sheet.cells("d_i")[gap - 1][0]
-    for content, words in (("=0", "; differs in"), (None, "; partly filled"), ('=""', "")):
+    for content, words in (("=0", "; differs in photo {}"), (None, "; partly filled"), ('=""', "")):
         cell.value = content
         found = feedback(sheet.save())[0]["d_i"]
-        assert found == (f"right up to photo {gap - 1}{words}" + f" photo {gap}" * ("=0" == content)
-                         if words else LOOKS_RIGHT)  # fmt: skip
+        begin = f"right up to photo {gap - 1}" if words else LOOKS_RIGHT
+        assert found == begin + words.format(gap)
 
 
 @pytest.mark.parametrize("name", exercise_names())

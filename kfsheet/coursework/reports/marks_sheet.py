@@ -42,6 +42,8 @@ def _look(style: int | None) -> str:
 def inline_cell(place: str, words: str, style: int | None = None) -> str:
     """A cell that holds a text, as XML."""
     text = escape("".join(c for c in words if c.isprintable()))
+    if not text:
+        return f'<c r="{place}"{_look(style)}/>'
     content = f'<is><t xml:space="preserve">{text}</t></is>'
     return f'<c r="{place}"{_look(style)} t="inlineStr">{content}</c>'
 
