@@ -41,6 +41,9 @@ def add_commands(commands: argparse._SubParsersAction, exercise: str) -> None:
     handout.add_argument(
         "--force", action="store_true", help="also replace handouts that would become others"
     )
+    grade.add_argument(
+        "--show-key", action="store_true", help="also write a right formula into the feedback"
+    )
     handout.set_defaults(run=run_handout)
     grade.set_defaults(run=run_grade)
 
@@ -131,7 +134,7 @@ def run_grade(arguments: argparse.Namespace) -> int:
         progress=lambda items, count: progress(items, "grade", count, _judged),
     )
     results = override([with_all_marks(r, exercise) for r in results], iter(lines))
-    for path in write_reports(exercise, results, handed, out):
+    for path in write_reports(exercise, results, handed, out, show_key=arguments.show_key):
         print(path)
     _summarize(results, handed, out)
     if skipped := [path.name for path in passed_over(arguments.submissions, out)]:

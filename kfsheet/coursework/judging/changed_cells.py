@@ -64,7 +64,7 @@ def _formulas(
     exercise: Exercise, book: Book, addresses: CellAddresses, calculated: CalculatedAnswers
 ) -> Iterator[str]:
     asked = {q.name for q in exercise.questions}
-    original = original_workbook(exercise.model)
+    original = original_workbook(exercise.model, exercise.waiting)
     unmoved = original.addresses.tables == addresses.tables
     unmoved &= original.addresses.scalars == addresses.scalars
     for column in exercise.model.table.values():

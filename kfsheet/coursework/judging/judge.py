@@ -17,7 +17,14 @@ from math import inf
 
 from openpyxl.utils import FORMULAE
 
-from kfsheet.coursework.judging.answer_rows import AnswerCell, content_of, not_in, rows_of, shape
+from kfsheet.coursework.judging.answer_rows import (
+    AnswerCell,
+    content_of,
+    looked_at,
+    not_in,
+    rows_of,
+    shape,
+)
 from kfsheet.coursework.judging.calculated_answers import SECONDS, CalculatedAnswers
 from kfsheet.coursework.judging.dependencies import ancestors, delays
 from kfsheet.coursework.judging.mistakes.diagnosis import (
@@ -74,6 +81,14 @@ class Mark:
     status: str
     remark: str
     fingerprint: str = ""
+    step: int = 0
+    """The first step that is not right; of a right answer, one of those that are alike."""
+
+    formula: str = ""
+    """What stands in that step."""
+
+    differs: str = ""
+    """The cell of that step, if it is not right."""
 
 
 Recalculated = Callable[[CellAddresses, str], dict[int, bool]]
@@ -115,7 +130,8 @@ class Judge:
         if any(_may_be_known(cell) for cell in cells):
             found = self._recalculated(self.addresses, asked.name)
             cells = [_decided(cell, found) for cell in cells]
-        return self._marked(asked, cells)
+        first = next((cell for cell in cells if cell.status != RIGHT), None)
+        return replace(self._marked(asked, cells), **looked_at(self.book, cells, first))
 
     def _found(self, name: str, step: int) -> AnswerCell | None:
         """What stands in a cell, by its kind."""

@@ -7,52 +7,72 @@ from pathlib import Path
 
 from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.coursework.reading.submission import read_submission
+from kfsheet.coursework.reports.assessment import GRADED
 from kfsheet.coursework.reports.class_page import class_page
 from kfsheet.coursework.reports.gradebooks import gradebooks, points_shown
 from kfsheet.coursework.reports.grading import STATUSES, Handed, Result
 from kfsheet.coursework.reports.html_pages import page, table
-from kfsheet.coursework.reports.marked_workbook import colour_of, mark_workbook
+from kfsheet.coursework.reports.marked_workbook import mark_workbook
+from kfsheet.coursework.reports.marks_sheet import WHY, colour_of
+from kfsheet.coursework.reports.right_formulas import right_formulas
 from kfsheet.files import write_file
 from kfsheet.model.exercise import Exercise
 
 
 def write_reports(
-    exercise: Exercise, results: list[Result], handed: list[Handed], out: str | Path
+    exercise: Exercise,
+    results: list[Result],
+    handed: list[Handed],
+    out: str | Path,
+    *,
+    show_key: bool = False,
 ) -> list[Path]:
-    """Write every report into ``out`` and return the files for the lecturer."""
+    """Write every report into ``out`` and return the files for the lecturer.
+
+    With ``show_key`` the students' files hold a right formula beside each answer.
+    """
     out = Path(out)
     for result in results:
-        _write_feedback(exercise, result, out)
+        _write_feedback(exercise, result, out, show_key)
     texts = gradebooks(exercise, results) | {"class.html": class_page(exercise, results, handed)}
     return [write_file(out / name, text.encode()) for name, text in texts.items()]
 
 
-def _write_feedback(exercise: Exercise, result: Result, out: Path) -> None:
+def _write_feedback(exercise: Exercise, result: Result, out: Path, show_key: bool) -> None:
     """A student's page, and the marked workbook if one could be made."""
     folder, name = out / "feedback", result.student.id
-    write_file(folder / f"{name}.html", _student_page(exercise, result).encode())
     target = folder / f"{name}.xlsx"
     target.unlink(missing_ok=True)  # of an earlier run, when another file counted
     marked = out / "work" / f"{result.key}.xlsx"
-    if result.feedback and result.changed:
-        write_file(target, _marked_anew(exercise, result))
+    keys: dict[str, str] = {}
+    if result.marks and (show_key or (result.feedback and result.changed)):
+        book = read_submission(result.path)
+        addresses = CellAddresses.find(book, exercise.model)
+        keys = right_formulas(book, addresses, result.marks) if show_key else {}
+        if result.feedback:
+            content = mark_workbook(
+                result.path, book, addresses, result.marks, result.override, keys
+            )
+            write_file(target, content)
     elif result.feedback and marked.is_file():
         write_file(target, marked.read_bytes())
+    write_file(folder / f"{name}.html", _student_page(exercise, result, keys).encode())
 
 
-def _marked_anew(exercise: Exercise, result: Result) -> bytes:
-    """The student's workbook with the marks that a lecturer has changed."""
-    book = read_submission(result.path)
-    addresses = CellAddresses.find(book, exercise.model)
-    return mark_workbook(result.path, book, addresses, result.marks, result.override)
-
-
-def _student_page(exercise: Exercise, result: Result) -> str:
+def _student_page(exercise: Exercise, result: Result, keys: dict[str, str]) -> str:
     body = f"<h1>{escape(exercise.title)}</h1><p>{escape(result.student.name)}: "
     body += f"<b>{points_shown(result.score)} of {result.maximum} points</b></p>"
     status = STATUSES.get(result.status, "")
     body += f"<p>{escape(result.status)}: {escape(status)}. {escape(result.remark)}</p>"
-    rows = ((colour_of(m), (m.name, points_shown(m.score), m.points, m.status, m.remark))
-            for m in result.marks)  # fmt: skip
-    body += table(("answer", "score", "points", "status", "remark"), rows)
+    heads = ["answer", "score", "points", "status", "remark", "first differs", "your formula"]
+    rows = [
+        (
+            colour_of(m),
+            [m.name, points_shown(m.score), m.points, m.status, m.remark, m.differs, m.formula]
+            + [keys.get(m.name, "")] * bool(keys),
+        )
+        for m in result.marks
+    ]
+    body += table(heads + ["a right formula"] * bool(keys), rows)
+    body += f"<p>{escape(WHY)}</p>" if result.status == GRADED else ""
     return page(f"{exercise.title}: {result.student.name}", body)

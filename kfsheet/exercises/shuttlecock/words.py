@@ -6,10 +6,10 @@ from kfsheet.exercises.shuttlecock.forecasts import NEWTON_STEPS
 from kfsheet.model.exercise import Question
 
 ABOUT = (
-    "A robot is to kick a shuttlecock back. Two cameras see it 30 times a second with errors of 6 "
-    "to 17 cm; the robot needs the place and the moment of the fall, and early. The source of this "
-    "exercise filters the positions, then fits the track to them, and claims that the fall point "
-    "settles faster and better than without the filter.",
+    "A robot is to kick a shuttlecock back. Two cameras see it {fps} times a second, with errors "
+    "whose power is 1/{SNR} of the signal's; the robot needs the place and the moment of the fall, "
+    "and early. The source of this exercise filters the positions, then fits the track to them, "
+    "and claims that the fall point settles faster and better than without the filter.",
     "Look at both fits on the sheet Charts: 'Fit raw' takes the positions as the cameras saw them, "
     "'Fit filtered' as the filter of the sheet Kalman corrected them. The filter's positions are "
     "indeed better than the cameras'. Are its fall points?",
