@@ -33,9 +33,13 @@ class FormulaError(KfsheetError):
     """A formula cannot be read as mathematics: arrays, look-ups, text, or no formula at all."""
 
 
-class SubmissionError(KfsheetError):
-    """A file that was handed in cannot be graded; ``status`` is one word for a table."""
+class UnreadableFileError(WorkbookError):
+    """A file cannot be read as a workbook; ``status`` is one word for a table."""
 
     def __init__(self, status: str, remark: str) -> None:
         super().__init__(f"{status}: {remark}")
         self.status, self.remark = status, remark
+
+
+class SubmissionError(UnreadableFileError):
+    """A file that was handed in cannot be graded."""

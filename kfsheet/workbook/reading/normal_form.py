@@ -1,0 +1,305 @@
+"""A workbook as Excel would have saved it: what all other modules, and engines, are given.
+
+Programs name parts as they like, prefix every element, leave out addresses that can be counted,
+or save the strict variant of the format. All of that is one workbook. A container that is plain
+already, as most are, is left as it is.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import re
+import zipfile
+from datetime import datetime, time
+from io import BytesIO
+from xml.etree.ElementTree import Element
+from xml.parsers import expat
+from xml.sax.saxutils import escape, quoteattr
+
+from kfsheet.errors import UnreadableFileError
+from kfsheet.workbook.reading.archive import (
+    MAIN,
+    START,
+    Container,
+    local_name,
+    plain_name,
+)
+
+TYPES = "[Content_Types].xml"
+WORKSHEET = re.compile(r"xl/worksheets/[^/\\%]+\.xml")
+STRICT = b"purl.oclc.org/ooxml"
+TRANSITIONAL = {  # the rest keeps its words
+    b"spreadsheetml/main": b"spreadsheetml/2006/main",
+    b"drawingml/": b"drawingml/2006/",
+    b"officeDocument/extendedProperties": b"officeDocument/2006/extended-properties",
+    b"officeDocument/customProperties": b"officeDocument/2006/custom-properties",
+    b"officeDocument/relationships/extendedProperties":
+        b"officeDocument/2006/relationships/extended-properties",
+    b"officeDocument/relationships/customProperties":
+        b"officeDocument/2006/relationships/custom-properties",
+    b"officeDocument/": b"officeDocument/2006/",
+}  # fmt: skip
+STRICT_NAME = re.compile(
+    rb"http://purl\.oclc\.org/ooxml/(%s)" % b"|".join(sorted(TRANSITIONAL, key=len, reverse=True))
+)
+HEAD = re.compile(
+    rb'\s*(?:<\?xml(?:(?!encoding|\?>).)*(?:encoding=["\'](?i:utf-8|us-ascii)["\'][^>]*)?\?>)?'
+    rb'\s*<(?:workbook|worksheet|sst|styleSheet)\b[^>]*\sxmlns="%s"' % re.escape(MAIN.encode()),
+    re.DOTALL,
+)
+ODD = re.compile(rb"<!--|<!\[|<\?(?!xml )|<\w+:AlternateContent")
+# A cell or a row without an address that can be found by a look.
+UNPLACED = re.compile(
+    rb'<c(?=[\s/>])(?!(?: s="\d+")? r="[A-Z]+[1-9]\d*"|[^<>]*\sr="[A-Z]+[1-9]\d*")'
+    rb'|<row(?=[\s/>])(?![^<>]*\sr="[1-9]\d*")'
+    rb'|<c\s[^<>]*\st="d"'
+)
+PLACES = {  # where parts of these types lie by habit
+    "styles": "xl/styles.xml",
+    "sharedStrings": "xl/sharedStrings.xml",
+    "theme": "xl/theme/theme1.xml",
+}
+STYLES = (
+    f'<styleSheet xmlns="{MAIN}"><fonts count="1"><font><sz val="11"/><name val="Calibri"/></font>'
+    '</fonts><fills count="2"><fill><patternFill patternType="none"/></fill><fill><patternFill '
+    'patternType="gray125"/></fill></fills><borders count="1"><border><left/><right/><top/><bottom/>'
+    '<diagonal/></border></borders><cellStyleXfs count="1"><xf numFmtId="0" fontId="0" fillId="0" '
+    'borderId="0"/></cellStyleXfs><cellXfs count="1"><xf numFmtId="0" fontId="0" fillId="0" '
+    'borderId="0" xfId="0"/></cellXfs><cellStyles count="1"><cellStyle name="Normal" xfId="0" '
+    'builtinId="0"/></cellStyles></styleSheet>'
+).encode()
+"""Styles of a workbook that looks like nothing in particular."""
+
+
+def normal_form(container: Container) -> Container:
+    """The same workbook in plain parts with plain names; the container itself if it is plain.
+
+    Raises
+    ------
+    UnreadableFileError
+        If it is no workbook, or a part declares a document type.
+    """
+    names = _new_names(container)
+    spreadsheet = {container.start, *container.worksheets.values()}
+    spreadsheet |= set(filter(None, map(container.linked, ("sharedStrings", "styles"))))
+    odd = {name for name in spreadsheet if not _is_plain(container.read(name))}
+    strict = odd and any(STRICT in container.read(name) for name in odd)
+    if not odd and all(old == new for old, new in names.items()) and _links_are_exact(container):
+        return container
+    return Container(_rewritten(container, names, odd, bool(strict)), container.limits)
+
+
+def _new_names(container: Container) -> dict[str, str]:
+    """Names of parts by those that they have now."""
+    names = {name: name.replace("\\", "/") for name in container.names}
+    if container.find(TYPES):
+        names[container.find(TYPES)] = TYPES
+    names[container.start] = START
+    sheets = container.worksheets.values()
+    if not all(map(WORKSHEET.fullmatch, sheets)):
+        names |= {part: f"xl/worksheets/sheet{n}.xml" for n, part in enumerate(sheets, 1)}
+    for kind, place in PLACES.items():
+        if part := container.linked(kind):
+            names[part] = place
+    for part in [*names]:  # what a part leads to lies beside it
+        if plain_name(part).endswith(".rels") and (source := _source(container, part)):
+            folder, base = posixpath.split(names[source])
+            names[part] = posixpath.join(folder, "_rels", f"{base}.rels")
+        elif plain_name(part) == "_rels/.rels":
+            names[part] = "_rels/.rels"
+    if len(set(names.values())) < len(names):
+        raise UnreadableFileError("refused", "two parts of the file want the same place")
+    return names
+
+
+def _source(container: Container, relations: str) -> str | None:
+    """The part whose relations these are."""
+    folder, base = posixpath.split(relations.replace("\\", "/"))
+    name = base[: -len(".rels")]
+    return container.find(posixpath.join(posixpath.dirname(folder), name)) if name else None
+
+
+def _is_plain(xml: bytes) -> bool:
+    head = HEAD.match(xml[:10_000])
+    return bool(head) and not ODD.search(xml) and not UNPLACED.search(xml)
+
+
+def _links_are_exact(container: Container) -> bool:
+    """Whether relations name parts letter by letter as they stand in the zip."""
+    names = set(container.names)
+    for relations in container.names:
+        if relations.lower().endswith(".rels"):
+            folder = posixpath.dirname(posixpath.dirname(relations))
+            for item in container.tree(relations):
+                there = item.get("Target", "")
+                path = posixpath.normpath(f"{folder}/{there}").removeprefix("/")
+                exact = there[1:] if there.startswith("/") else path
+                if item.get("TargetMode") != "External" and exact not in names:
+                    if container.find(container.target(folder, item)):
+                        return False
+    return True
+
+
+def _rewritten(
+    container: Container, names: dict[str, str], odd: set[str], strict: bool
+) -> bytes:  # fmt: skip
+    result = BytesIO()
+    with zipfile.ZipFile(result, "w", zipfile.ZIP_DEFLATED) as new:
+        for old, name in names.items():
+            content = container.read(old)
+            if name.endswith(".rels"):
+                content = _relations(container, old, names)
+            elif name == TYPES:
+                content = _types(container, old, names)
+            elif old in odd:
+                content = plain_xml(content)
+            if strict and name.endswith((".xml", ".rels")):
+                content = _transitional(content)
+            new.writestr(name, content)
+    return result.getvalue()
+
+
+def _transitional(xml: bytes) -> bytes:
+    """Names of the strict variant by those that every program knows."""
+    words = rb"http://schemas.openxmlformats.org/"
+    return STRICT_NAME.sub(lambda match: words + TRANSITIONAL[match[1]], xml)
+
+
+def _relations(container: Container, part: str, names: dict[str, str]) -> bytes:
+    folder = posixpath.dirname(posixpath.dirname(part.replace("\\", "/")))
+    home = posixpath.dirname(posixpath.dirname(names[part]))
+    root = container.tree(part)
+    for item in root:
+        there = names.get(container.target(folder, item))
+        if there and item.get("TargetMode") != "External":
+            item.set("Target", posixpath.relpath(there, home or "."))
+    return _plain_tree(root)
+
+
+def _types(container: Container, part: str, names: dict[str, str]) -> bytes:
+    root = container.tree(part)
+    for item in root:
+        there = container.find(item.get("PartName", ""))
+        if there:
+            item.set("PartName", f"/{names[there]}")
+    return _plain_tree(root)
+
+
+def _plain_tree(root: Element) -> bytes:
+    """A flat list of elements, as relations and types are, without prefixes."""
+    space = root.tag[1:].partition("}")[0]
+    items = "".join(
+        f"<{local_name(i.tag)} {' '.join(f'{k}={quoteattr(v)}' for k, v in i.attrib.items())}/>"
+        for i in root
+    )
+    tag = local_name(root.tag)
+    return f"<{tag} xmlns={quoteattr(space)}>{items}</{tag}>".encode()
+
+
+def plain_xml(xml: bytes) -> bytes:
+    """A part of a workbook without prefixes, comments and choices, in UTF-8, each cell placed.
+
+    >>> plain_xml(b'<x:c xmlns:x="%s"><x:v>1</x:v></x:c>' % MAIN.encode()).decode()[-36:]
+    'main" r="A1"><v>1</v></c>'
+    """
+    return _Plain().read(xml)
+
+
+class _Plain:
+    """Writes what it hears, in plain words."""
+
+    def __init__(self) -> None:
+        self._parser = expat.ParserCreate(namespace_separator=" ")
+        self._parser.buffer_text = self._parser.namespace_prefixes = True
+        self._parser.StartNamespaceDeclHandler = self._declare
+        self._parser.StartElementHandler, self._parser.EndElementHandler = self._start, self._end
+        self._parser.CharacterDataHandler = self._hear
+        self._parser.StartDoctypeDeclHandler = self._refuse
+        self._out: list[str] = []
+        self._declared: list[str] = []
+        self._tags: list[str] = []
+        self._row = self._column = 0
+        self._deaf = 0  # how deep within what is for programs that know less
+        self._date = False
+
+    def read(self, xml: bytes) -> bytes:
+        self._parser.Parse(xml, True)
+        return "".join(self._out).encode()
+
+    @staticmethod
+    def _refuse(*_: object) -> None:
+        raise UnreadableFileError("refused", "its XML declares a document type")
+
+    def _declare(self, prefix: str | None, space: str | None) -> None:
+        if not _is_main(space or ""):
+            self._declared.append(f" xmlns{':' * bool(prefix)}{prefix or ''}={quoteattr(space or '')}")
+
+    def _name(self, name: str) -> str:
+        space, _, rest = name.partition(" ")
+        if not rest or _is_main(space):
+            return (rest or name).partition(" ")[0]
+        local, _, prefix = rest.partition(" ")
+        return f"{prefix}:{local}" if prefix else local
+
+    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        name = self._name(tag)
+        local = name.rpartition(":")[2]
+        if self._deaf or local == "Fallback":
+            self._deaf += 1
+            return
+        if local in ("AlternateContent", "Choice") and ":" in name:
+            self._declared.clear()
+            self._tags.append("")
+            return
+        attributes.pop("conformance", "")  # only the strict variant has it
+        if name in ("row", "c"):
+            attributes = self._placed(name, attributes)
+        space = "" if self._tags else f' xmlns="{MAIN}"'
+        words = "".join(f" {self._name(k)}={quoteattr(v)}" for k, v in attributes.items())
+        self._out.append(f"<{name}{space}{''.join(self._declared)}{words}>")
+        self._declared.clear()
+        self._tags.append(name)
+
+    def _placed(self, name: str, attributes: dict[str, str]) -> dict[str, str]:
+        from openpyxl.utils import coordinate_to_tuple, get_column_letter  # costly, seldom needed
+
+        place = attributes.get("r", "").strip().upper()
+        if name == "row":
+            self._row, self._column = int(place or self._row + 1), 0
+            return {**attributes, "r": str(self._row)}
+        row, column = coordinate_to_tuple(place) if place else (self._row, self._column + 1)
+        self._row, self._column = row or 1, column
+        self._date = attributes.get("t") == "d"
+        more = {"t": "n"} if self._date else {}
+        return {**attributes, **more, "r": f"{get_column_letter(column)}{self._row}"}
+
+    def _hear(self, words: str) -> None:
+        if self._deaf:
+            return
+        if self._date and self._tags and self._tags[-1] == "v":
+            words = str(serial_of_date(words))
+        self._out.append(escape(words))
+
+    def _end(self, _: str) -> None:
+        if self._deaf:
+            self._deaf -= 1
+        elif tag := self._tags.pop():
+            self._out.append(f"</{tag}>")
+
+
+def _is_main(space: str) -> bool:
+    return space == MAIN or space == "http://purl.oclc.org/ooxml/spreadsheetml/main"
+
+
+def serial_of_date(text: str) -> float:
+    """The number of a date in ISO 8601: days since the last day of 1899, and parts of a day.
+
+    >>> serial_of_date("1900-03-01T12:00:00")
+    61.5
+    """
+    text = text.strip().removesuffix("Z")
+    if "-" not in text:
+        clock = time.fromisoformat(text)
+        return (clock.hour * 3600 + clock.minute * 60 + clock.second) / 86400
+    days = datetime.fromisoformat(text).replace(tzinfo=None) - datetime(1899, 12, 30)
+    return days.days + days.seconds / 86400 + days.microseconds / 86400e6
