@@ -21,10 +21,12 @@ from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.coursework.reading.submission import Book
 from kfsheet.errors import WorkbookError
 from kfsheet.parsing.references import Address
+from kfsheet.workbook.reading.archive import MAIN, Container
+from kfsheet.workbook.reading.normal_form import STYLES, normal_form
 
 COLOURS = {"full": "FFC6EFCE", "part": "FFFFEB9C", "none": "FFFFC7CE"}
 PART, RELATION = "xl/worksheets/kfsheetMarks.xml", "rIdKfsheetMarks"
-MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
+STYLES_PART = "xl/styles.xml"
 SHEET_KIND = "http://schemas.openxmlformats.org/officeDocument/2006/relationships/worksheet"
 CONTENT = "application/vnd.openxmlformats-officedocument.spreadsheetml.worksheet+xml"
 REMARK_WIDTH = 90  # characters
@@ -53,24 +55,27 @@ def mark_workbook(
         If a part of the workbook is not where it should be.
     """
     result = BytesIO()
-    with zipfile.ZipFile(path) as old, zipfile.ZipFile(result, "w", zipfile.ZIP_DEFLATED) as new:
-        styles, numbers = _styles(_text(old, "xl/styles.xml"))
-        changed = {"xl/styles.xml": styles, **_with_marks_sheet(old, book)}
-        for sheet, cells in _headings(addresses, marks).items():
-            part = book.parts[sheet]
-            changed[part] = _with_words(_text(old, part), cells, numbers)
-        for item in old.infolist():
-            content = changed.get(item.filename)
-            new.writestr(item.filename, old.read(item) if content is None else content.encode())
+    old = normal_form(Container.open(path))
+    numbers: dict[str, int | None] = dict.fromkeys(COLOURS)
+    changed = _with_marks_sheet(old, book)
+    if old.find(STYLES_PART):  # a file without looks gets words only
+        changed[STYLES_PART], numbers = _styles(_text(old, STYLES_PART))
+    for sheet, cells in _headings(addresses, marks).items():
+        part = book.parts[sheet]
+        changed[part] = _with_words(_text(old, part), cells, numbers)
+    with zipfile.ZipFile(result, "w", zipfile.ZIP_DEFLATED) as new:
+        for name in old.names:
+            content = changed.get(name)
+            new.writestr(name, old.read(name) if content is None else content.encode())
         new.writestr(PART, _sheet(marks, numbers, total))
     return result.getvalue()
 
 
-def _text(archive: zipfile.ZipFile, part: str) -> str:
-    return archive.read(part).decode()
+def _text(container: Container, part: str) -> str:
+    return container.read(part).decode("utf-8-sig")
 
 
-def _with_marks_sheet(old: zipfile.ZipFile, book: Book) -> dict[str, str]:
+def _with_marks_sheet(old: Container, book: Book) -> dict[str, str]:
     """The three parts that say of a new worksheet: that it is there, where, and what it is."""
     links, kinds = "xl/_rels/workbook.xml.rels", "[Content_Types].xml"
     link = f'<Relationship Id="{RELATION}" Type="{SHEET_KIND}" Target="/{PART}"/>'
@@ -105,13 +110,13 @@ def _styles(xml: str) -> tuple[str, dict[str, int]]:
 
 
 def _more(xml: str, tag: str, items: str) -> tuple[str, int]:
-    """Append items to a counted list; the number of the first of them."""
-    match = re.search(rf'<{tag}\b[^>]*\bcount="(\d+)"[^>]*>', xml)
+    """Append items to a list, which need not be counted; the number of the first of them."""
+    match = re.search(rf"<{tag}\b[^>]*>(.*?)</{tag}>", xml, re.DOTALL)
     if not match:
         raise WorkbookError(f"the workbook's styles have no list {tag}")
-    count = int(match[1])
-    head = match[0].replace(f'count="{count}"', f'count="{count + len(COLOURS)}"')
-    return _before(xml.replace(match[0], head, 1), f"</{tag}>", items), count
+    count = len(re.findall(r"<(?:fill|xf)\b", match[1]))
+    new = f'<{tag} count="{count + len(COLOURS)}">{match[1]}{items}</{tag}>'
+    return xml.replace(match[0], new, 1), count
 
 
 def _with_sheet(xml: str, sheets: object) -> str:

@@ -80,8 +80,7 @@ def copy_for_ironcalc(path: str | Path, copy: str | Path) -> None:
         return share_formulas(xml) if ours else STYLE.sub(rb"\1", _without_values(xml))
 
     with refusing(path):
-        old = Container.open(path)
-        _copy(old if ours else normal_form(old), copy, rewritten, looks=ours)
+        _copy(normal_form(Container.open(path)), copy, rewritten, looks=ours)
 
 
 def _copy(

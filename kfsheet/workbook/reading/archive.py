@@ -122,6 +122,7 @@ class Container:
         self._archive = zipfile.ZipFile(BytesIO(content))
         self._check_parts(self._archive.infolist())
         self._names = {plain_name(name): name for name in self._archive.namelist()}
+        self._read: dict[str, bytes] = {}
 
     @classmethod
     def open(cls, path: str | Path, limits: Limits = OWN) -> Container:
@@ -147,8 +148,14 @@ class Container:
 
     def read(self, name: str) -> bytes:
         """The content of a part."""
+        key = plain_name(name)
+        if key not in self._read:
+            self._read[key] = self._unpacked(self._names[key])
+        return self._read[key]
+
+    def _unpacked(self, name: str) -> bytes:
         # The directory's size is the sender's word; only what comes out counts.
-        with self._archive.open(self._names[plain_name(name)]) as part:
+        with self._archive.open(name) as part:
             content = part.read(self.limits.part + 1)
         if len(content) > self.limits.part:
             raise UnreadableFileError("too large", f"{name} unpacks to more than the limit")

@@ -47,13 +47,10 @@ HEAD = re.compile(
     rb'\s*<(?:workbook|worksheet|sst|styleSheet)\b[^>]*\sxmlns="%s"' % re.escape(MAIN.encode()),
     re.DOTALL,
 )
-ODD = re.compile(rb"<!--|<!\[|<\?(?!xml )|<\w+:AlternateContent")
-# A cell or a row without an address that can be found by a look.
-UNPLACED = re.compile(
-    rb'<c(?=[\s/>])(?!(?: s="\d+")? r="[A-Z]+[1-9]\d*"|[^<>]*\sr="[A-Z]+[1-9]\d*")'
-    rb'|<row(?=[\s/>])(?![^<>]*\sr="[1-9]\d*")'
-    rb'|<c\s[^<>]*\st="d"'
-)
+ODD = (b"<!-", b"<![", b't="d"')
+# A cell or a row whose address is not found by a quick look.
+UNPLACED = re.compile(rb'<c(?=[\s/>])(?! r="[A-Z])|<row(?=[\s/>])(?![^<>]* r="[1-9])')
+CHOICE = b"AlternateContent"
 PLACES = {  # where parts of these types lie by habit
     "styles": "xl/styles.xml",
     "sharedStrings": "xl/sharedStrings.xml",
@@ -120,15 +117,20 @@ def _source(container: Container, relations: str) -> str | None:
 
 
 def _is_plain(xml: bytes) -> bool:
-    head = HEAD.match(xml[:10_000])
-    return bool(head) and not ODD.search(xml) and not UNPLACED.search(xml)
+    if not HEAD.match(xml[:10_000]) or any(word in xml for word in ODD) or UNPLACED.search(xml):
+        return False
+    return xml.find(CHOICE, 0, xml.find(b"</sheetData>") + 1) < 0  # after the cells it is a drawing
 
 
 def _links_are_exact(container: Container) -> bool:
     """Whether relations name parts letter by letter as they stand in the zip."""
     names = set(container.names)
+    if container.find(TYPES) and b"<Types" not in container.read(TYPES):
+        return False
     for relations in container.names:
         if relations.lower().endswith(".rels"):
+            if b"<Relationships" not in container.read(relations):
+                return False
             folder = posixpath.dirname(posixpath.dirname(relations))
             for item in container.tree(relations):
                 there = item.get("Target", "")
@@ -147,13 +149,13 @@ def _rewritten(
     with zipfile.ZipFile(result, "w", zipfile.ZIP_DEFLATED) as new:
         for old, name in names.items():
             content = container.read(old)
-            if name.endswith(".rels"):
+            if name.lower().endswith(".rels"):
                 content = _relations(container, old, names)
             elif name == TYPES:
                 content = _types(container, old, names)
             elif old in odd:
                 content = plain_xml(content)
-            if strict and name.endswith((".xml", ".rels")):
+            if strict and name.lower().endswith((".xml", ".rels")):
                 content = _transitional(content)
             new.writestr(name, content)
     return result.getvalue()
@@ -232,7 +234,9 @@ class _Plain:
 
     def _declare(self, prefix: str | None, space: str | None) -> None:
         if not _is_main(space or ""):
-            self._declared.append(f" xmlns{':' * bool(prefix)}{prefix or ''}={quoteattr(space or '')}")
+            self._declared.append(
+                f" xmlns{':' * bool(prefix)}{prefix or ''}={quoteattr(space or '')}"
+            )
 
     def _name(self, name: str) -> str:
         space, _, rest = name.partition(" ")
@@ -263,15 +267,15 @@ class _Plain:
     def _placed(self, name: str, attributes: dict[str, str]) -> dict[str, str]:
         from openpyxl.utils import coordinate_to_tuple, get_column_letter  # costly, seldom needed
 
-        place = attributes.get("r", "").strip().upper()
+        place = attributes.pop("r", "").strip().upper()
         if name == "row":
             self._row, self._column = int(place or self._row + 1), 0
-            return {**attributes, "r": str(self._row)}
+            return {"r": str(self._row), **attributes}
         row, column = coordinate_to_tuple(place) if place else (self._row, self._column + 1)
         self._row, self._column = row or 1, column
         self._date = attributes.get("t") == "d"
         more = {"t": "n"} if self._date else {}
-        return {**attributes, **more, "r": f"{get_column_letter(column)}{self._row}"}
+        return {"r": f"{get_column_letter(column)}{self._row}", **attributes, **more}
 
     def _hear(self, words: str) -> None:
         if self._deaf:

@@ -43,6 +43,7 @@ class Package:
                 name.get("name", "").lower(): name.text or ""
                 for name in elements(self.container.workbook, "definedName")
             }
+
     @property
     def titles(self) -> list[str]:
         """Titles of the worksheets, in order."""
