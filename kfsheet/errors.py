@@ -25,6 +25,10 @@ class EngineError(KfsheetError):
     """A spreadsheet engine or a compiler is missing, crashed or ran out of time."""
 
 
+class MissingEngineError(EngineError):
+    """A spreadsheet engine is not installed."""
+
+
 class ForbiddenError(KfsheetError):
     """A formula uses what no answer may use."""
 

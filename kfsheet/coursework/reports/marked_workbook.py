@@ -22,7 +22,7 @@ from kfsheet.coursework.reading.submission import Book
 from kfsheet.errors import WorkbookError
 from kfsheet.parsing.references import Address
 from kfsheet.workbook.reading.archive import MAIN, Container
-from kfsheet.workbook.reading.normal_form import STYLES, normal_form
+from kfsheet.workbook.reading.normal_form import normal_form
 
 COLOURS = {"full": "FFC6EFCE", "part": "FFFFEB9C", "none": "FFFFC7CE"}
 PART, RELATION = "xl/worksheets/kfsheetMarks.xml", "rIdKfsheetMarks"

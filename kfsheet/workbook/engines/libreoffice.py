@@ -11,7 +11,7 @@ from typing import Any
 
 from openpyxl.utils.datetime import to_excel
 
-from kfsheet.errors import EngineError
+from kfsheet.errors import EngineError, MissingEngineError
 from kfsheet.processes import completed
 from kfsheet.workbook.engines.copies_for_engines import strip_values
 from kfsheet.workbook.engines.spreadsheet_engine import TIMEOUT, CellValue, Changes, Values
@@ -74,7 +74,9 @@ def convert(path: Path, folder: Path, kind: str) -> Path:
     """
     command = libreoffice()
     if command is None:
-        raise EngineError("LibreOffice is not installed; install it, or use --engine ironcalc")
+        raise MissingEngineError(
+            "LibreOffice is not installed; install it, or use --engine ironcalc"
+        )
     # A profile for each call: two LibreOffices with one profile block each other.
     with tempfile.TemporaryDirectory(prefix="kfsheet-profile-") as profile:
         arguments = [

@@ -1,8 +1,8 @@
-"""The zip of an .xlsx file, opened with suspicion: its parts by name, and what leads to them.
+r"""The zip of an .xlsx file, opened with suspicion: its parts by name, and what leads to them.
 
 Parts are read in memory, within limits, by parsers that refuse document types; nothing is unpacked,
 nothing is executed, no link is followed. Names are compared by the rules of the format, under which
-``xl\\Workbook.xml`` is ``/xl/workbook.xml`` and ``%20`` is a space.
+``xl\Workbook.xml`` is ``/xl/workbook.xml`` and ``%20`` is a space.
 """
 
 from __future__ import annotations
