@@ -37,6 +37,10 @@ class FormulaError(KfsheetError):
     """A formula cannot be read as mathematics: arrays, look-ups, text, or no formula at all."""
 
 
+class TooMuchWorkError(FormulaError):
+    """A formula takes more operations, or levels, than it was given."""
+
+
 class UnreadableFileError(WorkbookError):
     """A file cannot be read as a workbook; ``status`` is one word for a table."""
 

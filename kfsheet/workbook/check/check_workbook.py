@@ -161,7 +161,7 @@ def _checked(
         changed=list(_changes(inputs, now, built)),
         problems=_in_order(problems, book.package.titles),
         followers=len(differing - set(problems)),
-        unknown=[place(a) for a in differing if book.value(a) in UNKNOWN[engine]],
+        unknown=[place(a) for a in sorted(problems) if book.value(a) in UNKNOWN[engine]],
     )
 
 

@@ -39,6 +39,8 @@ EMPTY = re.compile(rb'(<(?:\w+:)?c\s[^>]*?)\s+t="n"(\s*/>|></(?:\w+:)?c>)')
 # IronCalc 0.9.1 cannot load the comments that openpyxl writes; no formula needs them.
 COMMENTS = re.compile(rb'<Relationship\b[^>]*/(?:comments|vmlDrawing)"[^>]*/>')
 DRAWING = re.compile(rb"<legacyDrawing\b[^>]*/>")
+BROKEN = re.compile(rb"(<f\b[^>]*>)([^<(]*\([^<]*)</f>")
+QUOTED = re.compile(rb"\"[^\"]*\"|'[^']*'")
 DATA_END = re.compile(rb"</sheetData>|<sheetData\s*/>")
 
 
@@ -57,7 +59,7 @@ def strip_values(path: str | Path, copy: str | Path, changes: Changes | None = N
         numbers = {old.worksheets[sheet]: cells for sheet, cells in (changes or {}).items()}
 
         def rewritten(name: str, xml: bytes) -> bytes:
-            xml = STYLE.sub(rb"\1", _without_values(xml))
+            xml = BROKEN.sub(_not_closed, STYLE.sub(rb"\1", _without_values(xml)))
             return _with_numbers(xml, numbers[name]) if name in numbers else xml
 
         _copy(old, copy, rewritten)
@@ -108,6 +110,12 @@ def _copy(
         folder = Path(copy).parent
         words = f"a copy of the workbook cannot be written to {folder}: {error.strerror or error}"
         raise EngineError(f"{words}; make room there, or set TMPDIR") from None
+
+
+def _not_closed(match: re.Match[bytes]) -> bytes:
+    """An error in the place of a formula that LibreOffice would mend and Excel would refuse."""
+    bare = QUOTED.sub(b"", match[2].replace(b"&quot;", b'"'))
+    return match[0] if bare.count(b"(") == bare.count(b")") else match[1] + b"NA()</f>"
 
 
 def _without_values(xml: bytes) -> bytes:
