@@ -1,4 +1,4 @@
-"""Forms that formulas take in files: our own engine beside LibreOffice, and beside Excel's rules."""
+"""Forms that formulas take in files: our own engine beside LibreOffice, and by Excel's rules."""
 
 import openpyxl
 import pytest

@@ -6,6 +6,7 @@ from pathlib import Path
 import openpyxl
 import pytest
 from odd_workbooks import DRESSES, dressed
+from openpyxl.formula import Tokenizer
 from students import ADA, SECRET, Paper
 
 from kfsheet import check_workbook, load_exercise
@@ -65,3 +66,23 @@ def test_the_normal_form_is_its_own(answered):
         normal = normal_form(Container(dressed(answered, dress)))
         assert normal_form(normal) is normal, dress
         openpyxl.load_workbook(io.BytesIO(normal.content))
+
+
+def test_check_reads_a_file_that_lost_its_names_and_properties(football, tmp_path):
+    """A program without names writes out what they stand for; the labels tell what is what."""
+    book = openpyxl.load_workbook(WORKBOOKS / "football.xlsx")
+    places = {name: defined.attr_text for name, defined in book.defined_names.items()}
+    for sheet in book:
+        for row in sheet.iter_rows():
+            for cell in row:
+                if cell.data_type == "f":
+                    found = Tokenizer(cell.value)
+                    for token in found.items:
+                        token.value = places.get(token.value, token.value)
+                    cell.value = found.render()
+    book.defined_names.clear()
+    book.custom_doc_props.props.clear()
+    book.save(tmp_path / "lost.xlsx")
+    report = check_workbook(tmp_path / "lost.xlsx", load_exercise)
+    assert report.holds, report.lines()
+    assert report.cells == 1188
