@@ -2,7 +2,7 @@
 
 =========  =====================================================================================
 file       :mod:`kfsheet.coursework.reading.submission` reads it within limits
-cells      :mod:`kfsheet.workbook.reading.worksheet` keeps formulas, numbers and texts
+cells      :mod:`kfsheet.workbook.reading.sheet_cells` keeps formulas, numbers and texts
 answers    :mod:`kfsheet.coursework.reading.cell_addresses` finds where they stand
 meaning    :mod:`kfsheet.coursework.judging.formula_meaning` makes each a SymPy expression
 mark       :mod:`kfsheet.coursework.judging.judge` compares it with the key, and names the mistake

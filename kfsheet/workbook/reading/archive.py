@@ -2,7 +2,7 @@ r"""The zip of an .xlsx file, opened with suspicion: its parts by name, and what
 
 Parts are read in memory, within limits, by parsers that refuse document types; nothing is unpacked,
 nothing is executed, no link is followed. Names are compared by the rules of the format, under which
-``xl\Workbook.xml`` is ``/xl/workbook.xml`` and ``%20`` is a space.
+capitals do not matter, a backslash is a slash, and ``%20`` is a space.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from kfsheet.parsing.calculator import Content
 from kfsheet.parsing.references import Cell
 from kfsheet.workbook.reading.archive import Container, elements, local_name
 from kfsheet.workbook.reading.normal_form import normal_form
-from kfsheet.workbook.reading.worksheet import LONGEST_TEXT, Budget, SheetReader
+from kfsheet.workbook.reading.sheet_cells import LONGEST_TEXT, Budget, SheetReader
 
 
 @dataclass
