@@ -25,6 +25,9 @@ from kfsheet.workbook.engines.spreadsheet_engine import CellValue, Changes
 WORLDS = {"ironcalc": 7, "libreoffice": 3}  # of those of all students; LibreOffice is slow
 TOLERANCE = 1e-8  # rows that build upon each other pass their rounding on
 SECONDS = 60.0  # of the engines' time for one workbook, all answers together
+WORK = 2.0  # seconds of computing for one answer, beyond what its workbook takes without it
+STARTS = {"ironcalc": 1.0, "libreoffice": 8.0}  # such seconds until an engine has begun
+CELLS = {"ironcalc": 60_000, "libreoffice": 20_000}  # of the model, loaded or calculated in one
 
 
 class Recalculation:
@@ -52,7 +55,8 @@ class Recalculation:
         wanted = [filled(world, addresses) for world in worlds]
         trials = [_changes(values, set(cells.values())) for values in wanted]
         try:
-            values = calculated(self._path, trials, list(cells.values()), self._left, engine)
+            work = _work(engine, wanted)
+            values = calculated(self._path, trials, [*cells.values()], self._left, engine, work)
         except KfsheetError:
             self.late |= time.monotonic() - began >= self._left
             return {}
@@ -64,6 +68,12 @@ class Recalculation:
             for (step, cell), seen in pairs
         }
         return {step: right for step, right in told.items() if right is not None}
+
+
+def _work(engine: str, wanted: Sequence[Cells]) -> float:
+    """Seconds of computing that an engine may take: what it loads and calculates, and WORK."""
+    cells = sum(len(cells) for cells in wanted[0].values()) if wanted else 0
+    return STARTS[engine] + WORK + (1 + len(wanted)) * cells / CELLS[engine]
 
 
 def _of(cell: Address, values: Cells) -> CellValue:

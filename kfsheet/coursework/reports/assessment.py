@@ -2,7 +2,7 @@
 
 =========  =====================================================================================
 file       :mod:`kfsheet.coursework.reading.submission` reads it within limits
-cells      :mod:`kfsheet.coursework.reading.worksheet` keeps formulas, numbers and texts
+cells      :mod:`kfsheet.workbook.reading.sheet_cells` keeps formulas, numbers and texts
 answers    :mod:`kfsheet.coursework.reading.cell_addresses` finds where they stand
 values     :mod:`kfsheet.coursework.judging.calculated_answers` calculates each in several worlds
 mark       :mod:`kfsheet.coursework.judging.judge` compares them with the key's

@@ -29,8 +29,11 @@ from kfsheet.coursework.reports.marks_sheet import (
 )
 from kfsheet.errors import WorkbookError
 from kfsheet.parsing.references import Address
+from kfsheet.workbook.reading.archive import Container
+from kfsheet.workbook.reading.normal_form import normal_form
 
 PART, RELATION = "xl/worksheets/kfsheetMarks.xml", "rIdKfsheetMarks"
+STYLES_PART = "xl/styles.xml"
 SHEET_KIND = "http://schemas.openxmlformats.org/officeDocument/2006/relationships/worksheet"
 CONTENT = "application/vnd.openxmlformats-officedocument.spreadsheetml.worksheet+xml"
 
@@ -54,29 +57,32 @@ def mark_workbook(
         If a part of the workbook is not where it should be.
     """
     result = BytesIO()
-    with zipfile.ZipFile(path) as old, zipfile.ZipFile(result, "w", zipfile.ZIP_DEFLATED) as new:
-        styles, numbers = _styles(_text(old, "xl/styles.xml"))
-        changed = {"xl/styles.xml": styles, **_with_marks_sheet(old, book)}
-        for part in book.parts.values():
-            changed[part] = _not_selected(_text(old, part))
-        for sheet, cells in _headings(addresses, marks).items():
-            part = book.parts[sheet]
-            changed[part] = _with_words(changed[part], cells, numbers)
-        for sheet, cells in _feedback(book, marks, numbers).items():
-            part = book.parts[sheet]
-            changed[part] = _with_cells(changed[part], cells)
-        for item in old.infolist():
-            content = changed.get(item.filename)
-            new.writestr(item.filename, old.read(item) if content is None else content.encode())
+    old = normal_form(Container.open(path))
+    numbers: dict[str, int | None] = dict.fromkeys((*COLOURS, PLAIN))
+    changed = _with_marks_sheet(old, book)
+    if old.find(STYLES_PART):  # a file without looks gets words only
+        changed[STYLES_PART], numbers = _styles(_text(old, STYLES_PART))
+    for part in book.parts.values():
+        changed[part] = _not_selected(_text(old, part))
+    for sheet, cells in _headings(addresses, marks).items():
+        part = book.parts[sheet]
+        changed[part] = _with_words(changed[part], cells, numbers)
+    for sheet, cells in _feedback(book, marks, numbers).items():
+        part = book.parts[sheet]
+        changed[part] = _with_cells(changed[part], cells)
+    with zipfile.ZipFile(result, "w", zipfile.ZIP_DEFLATED) as new:
+        for name in old.names:
+            content = changed.get(name)
+            new.writestr(name, old.read(name) if content is None else content.encode())
         new.writestr(PART, marks_sheet(marks, numbers, total, keys))
     return result.getvalue()
 
 
-def _text(archive: zipfile.ZipFile, part: str) -> str:
-    return archive.read(part).decode()
+def _text(container: Container, part: str) -> str:
+    return container.read(part).decode("utf-8-sig")
 
 
-def _with_marks_sheet(old: zipfile.ZipFile, book: Book) -> dict[str, str]:
+def _with_marks_sheet(old: Container, book: Book) -> dict[str, str]:
     """The three parts that say of a new worksheet: that it is there, where, and what it is."""
     links, kinds = "xl/_rels/workbook.xml.rels", "[Content_Types].xml"
     link = f'<Relationship Id="{RELATION}" Type="{SHEET_KIND}" Target="/{PART}"/>'
@@ -113,13 +119,13 @@ def _styles(xml: str) -> tuple[str, dict[str, int]]:
 
 
 def _more(xml: str, tag: str, items: str, more: int) -> tuple[str, int]:
-    """Append items to a counted list; the number of the first of them."""
-    match = re.search(rf'<{tag}\b[^>]*\bcount="(\d+)"[^>]*>', xml)
+    """Append items to a list, which need not be counted; the number of the first of them."""
+    match = re.search(rf"<{tag}\b[^>]*>(.*?)</{tag}>", xml, re.DOTALL)
     if not match:
         raise WorkbookError(f"the workbook's styles have no list {tag}")
-    count = int(match[1])
-    head = match[0].replace(f'count="{count}"', f'count="{count + more}"')
-    return _before(xml.replace(match[0], head, 1), f"</{tag}>", items), count
+    count = len(re.findall(r"<(?:fill|xf)\b", match[1]))
+    new = f'<{tag} count="{count + more}">{match[1]}{items}</{tag}>'
+    return xml.replace(match[0], new, 1), count
 
 
 def _with_sheet(xml: str, sheets: object) -> str:
