@@ -10,7 +10,6 @@ import openpyxl
 import pytest
 import students as do
 from conftest import need
-from kfsheet.coursework.judging.answer_key import asked_steps
 from openpyxl.utils import FORMULAE, get_column_letter
 from students import ADA, SECRET, Paper
 
@@ -26,7 +25,7 @@ from kfsheet.coursework.judging.changed_cells import changed_cells
 from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.coursework.reading.submission import read_submission
 from kfsheet.exercises import exercise_names
-from kfsheet.model.exercise import Exercise
+from kfsheet.model.exercise import Exercise, asked_steps
 from kfsheet.workbook.engines.recalculate import recalculate
 from kfsheet.workbook.write.layout import FIRST_ROW
 

@@ -16,10 +16,10 @@ from kfsheet import load_exercise
 from kfsheet.coursework.handout.handout_workbook import handout_bytes
 from kfsheet.coursework.reading import submission
 from kfsheet.coursework.reading.submission import read_submission
-from kfsheet.coursework.reading.worksheet import Formula
 from kfsheet.coursework.reports.assessment import assess
 from kfsheet.coursework.reports.grading import STATUSES
 from kfsheet.coursework.worker_pool import Failed, Pool
+from kfsheet.parsing.calculator import Formula
 from kfsheet.workbook.reading import archive
 
 FUZZED = 2_000

@@ -18,8 +18,7 @@ from openpyxl.utils import get_column_letter
 from kfsheet.coursework.handout import check_numbers, course_secret
 from kfsheet.coursework.handout.answer_order import Need, needs
 from kfsheet.coursework.handout.check_numbers import Steps
-from kfsheet.coursework.judging.answer_key import asked_steps
-from kfsheet.model.exercise import Exercise, Question
+from kfsheet.model.exercise import Exercise, Question, asked_steps
 from kfsheet.workbook.write.layout import FIRST_ROW, TOKEN_NAME, Layout, quote
 from kfsheet.workbook.write.run import Run
 from kfsheet.workbook.write.sheet import Sheet

@@ -16,8 +16,8 @@ from kfsheet.coursework.judging.calculated_answers import Outcome
 from kfsheet.coursework.reading.cell_addresses import CellAddresses, find_sheet
 from kfsheet.coursework.reading.formula_text import parsed
 from kfsheet.coursework.reading.submission import Book
-from kfsheet.coursework.reading.worksheet import Content, Formula
 from kfsheet.errors import FormulaError
+from kfsheet.parsing.calculator import Content, Formula
 from kfsheet.parsing.references import Address, Cell, Reference
 
 DISTANCE = re.compile(r"\{[^{}]*\}")

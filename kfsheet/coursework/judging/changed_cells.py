@@ -10,10 +10,10 @@ from kfsheet.coursework.judging.model_runs import OwnNumbers
 from kfsheet.coursework.judging.original_workbook import original_workbook
 from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.coursework.reading.submission import Book
-from kfsheet.coursework.reading.worksheet import Content, Formula
 from kfsheet.errors import KfsheetError
 from kfsheet.model.exercise import Exercise, asked_steps
 from kfsheet.model.expressions import columns_read
+from kfsheet.parsing.calculator import Content, Formula
 from kfsheet.parsing.references import Address, relative_key
 
 WORLDS_CHECKED = 3  # with the student's own numbers, with and without observations

@@ -54,11 +54,10 @@ from kfsheet.coursework.judging.precedents import (
 from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.coursework.reading.formula_text import forbidden
 from kfsheet.coursework.reading.submission import Book
-from kfsheet.coursework.reading.worksheet import Formula
 from kfsheet.coursework.time_limit import OutOfTimeError, time_limit
 from kfsheet.errors import ForbiddenError, KfsheetError
 from kfsheet.model.exercise import Question, asked_steps
-from kfsheet.parsing.calculator import TooMuchWorkError
+from kfsheet.parsing.calculator import Formula, TooMuchWorkError
 from kfsheet.parsing.references import relative_key
 
 CREDIT = {RIGHT: 1.0, HARD_CODED: 0.5, PARTLY: 0.5, GAPS: 0.5, NEARLY: 0.5}

@@ -9,8 +9,8 @@ from openpyxl.utils import get_column_letter
 
 from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.coursework.reading.submission import Book
-from kfsheet.coursework.reading.worksheet import Content, Formula
 from kfsheet.model.recurrence import Recurrence
+from kfsheet.parsing.calculator import Content, Formula
 from kfsheet.parsing.references import Address
 from kfsheet.workbook.write.exercise_sheets import section_sheet
 from kfsheet.workbook.write.layout import Layout

@@ -9,8 +9,8 @@ from openpyxl.utils import get_column_letter
 from kfsheet.coursework.reading.cell_addresses import CellAddresses, find_sheet, named_cell
 from kfsheet.coursework.reading.formula_text import forbidden, parsed
 from kfsheet.coursework.reading.submission import Book
-from kfsheet.coursework.reading.worksheet import Formula
 from kfsheet.errors import FormulaError
+from kfsheet.parsing.calculator import Formula
 from kfsheet.parsing.references import Address
 
 MOST = 2_000  # cells that are looked at

@@ -7,11 +7,11 @@ from collections.abc import Iterator, Sequence
 from openpyxl.utils import get_column_letter
 from sympy import Basic, Indexed, IndexedBase, Symbol
 
-from kfsheet.coursework.judging.answer_key import asked_steps
 from kfsheet.coursework.judging.judge import Mark
 from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.coursework.reading.submission import Book
 from kfsheet.errors import PrintError
+from kfsheet.model.exercise import asked_steps
 from kfsheet.model.expressions import Last, lag, t
 from kfsheet.parsing.references import Address
 from kfsheet.printing.excel import excel_code
