@@ -1,5 +1,8 @@
 """Spreadsheet engines are asked about what only they may know, and about nothing else."""
 
+import signal
+import subprocess
+import sys
 import time
 
 import pytest
@@ -60,16 +63,27 @@ def test_no_engine_is_asked_about_what_is_no_formula_or_too_much(formula, judged
     assert time.process_time() - began < 4
 
 
-def test_an_engine_that_computes_for_too_long_is_ended(judged, monkeypatch):
+def test_an_engine_is_asked_about_a_function_that_is_not_ours_and_may_compute_for_seconds(
+    judged, monkeypatch
+):
     asked = []
 
     def calculated(path, trials, cells, seconds, engine, work):
         asked.append((engine, work))
-        return found(path, trials, cells, seconds, engine, 0.001)
+        return found(path, trials, cells, seconds, engine, work)
 
     found = recalculated_answers.calculated
     monkeypatch.setattr(recalculated_answers, "calculated", calculated)
     monkeypatch.setattr(recalculated_answers, "libreoffice", lambda: None)
-    mark = judged("=BASE(G{r},2)")
-    assert mark.score == 0
-    assert all(work < 10 for _, work in asked), asked
+    assert judged("=DEC2BIN(ROW())+0").status == "wrong"
+    ((engine, work),) = asked
+    assert engine == "ironcalc"
+    assert 3 <= work < 4
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows limits no seconds of computing")
+def test_who_computes_for_too_long_is_ended():
+    module = "kfsheet.coursework.judging.recalculation_process"
+    program = f"from {module} import _limit\n_limit(0.5)\nwhile True: pass"
+    done = subprocess.run([sys.executable, "-c", program], timeout=120, capture_output=True)
+    assert done.returncode == -signal.SIGXCPU
