@@ -23,6 +23,7 @@ from kfsheet.errors import FormulaError, TooMuchWorkError
 from kfsheet.parsing.references import read_reference
 
 LONGEST = 8_192  # characters, as in Excel
+MOST_ARGUMENTS = 255  # as in Excel
 DEEPEST = 60  # levels of parentheses, calls and signs
 HIGHEST = 256  # levels of a tree, say terms of a sum; each is three calls on a stack of 1,000
 
@@ -219,6 +220,8 @@ class _Parser:
             return ("call", name)
         arguments = [self._argument()]
         while self._took(","):
+            if len(arguments) == MOST_ARGUMENTS:
+                raise FormulaError(f"{name} has more than {MOST_ARGUMENTS} arguments")
             arguments.append(self._argument())
         self.expect(")")
         if name == "IFERROR" and arguments[0][:2] == ("call", GOOGLES):

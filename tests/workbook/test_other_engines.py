@@ -5,6 +5,7 @@ from pathlib import Path
 
 import openpyxl
 import pytest
+from conftest import need
 from odd_workbooks import parts_of, zipped
 
 from kfsheet import check_workbook, load_exercise, recalculate, write_workbook
@@ -94,3 +95,21 @@ def test_a_misspelt_name_stays_a_mistake_in_the_engine_that_was_asked(stone, bui
     report = check_workbook(with_formula(built, "Fall", "D6", "=D5-gravity*dt"), stone)
     assert (report.engine, report.instead) == ("ironcalc", "")
     assert [p.address[1:] for p in report.problems] == [(6, 4)]
+
+
+@pytest.mark.parametrize("engine", ["ironcalc", "libreoffice", "own"])
+def test_a_number_may_be_put_into_a_cell_that_is_not_in_the_file(engine, built):
+    if engine == "libreoffice":
+        need("libreoffice")
+    path = with_formula(built, "Fall", "Z5", "=Z4*2+Z90")
+    values = recalculate(path, engine, {"Fall": {(4, 26): 3.0, (90, 26): 0.5, (91, 27): None}})
+    assert values["Fall"][5, 26] == 6.5
+
+
+def test_a_formula_that_is_not_closed_has_no_value_in_libreoffice(built):
+    """Excel refuses such a file; LibreOffice would close the parenthesis."""
+    need("libreoffice")
+    path = with_formula(built, "Fall", "Z5", '=IF(1>0,LEN("("),7')
+    values = recalculate(with_formula(path, "Fall", "Z6", '=LEN("((")+1'), "libreoffice")
+    assert values["Fall"][5, 26] == "#N/A"
+    assert values["Fall"][6, 26] == 3

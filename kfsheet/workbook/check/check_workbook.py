@@ -32,10 +32,8 @@ from kfsheet.workbook.check.opened_workbook import (
 )
 from kfsheet.workbook.check.other_inputs import other_inputs
 from kfsheet.workbook.check.report import Problem, Report
-from kfsheet.workbook.engines.libreoffice import libreoffice
-from kfsheet.workbook.engines.own import UNREAD
 from kfsheet.workbook.engines.recalculate import ENGINES
-from kfsheet.workbook.engines.spreadsheet_engine import Changes, Engine
+from kfsheet.workbook.engines.spreadsheet_engine import UNREAD, Changes, Engine
 from kfsheet.workbook.write.check_sheet import FIGURES, TOLERANCE, probes
 from kfsheet.workbook.write.layout import Layout
 from kfsheet.workbook.write.run import Run
@@ -113,6 +111,8 @@ def _by_another(
     path: str | Path, exercise: Exercise | Finder, engine: str, instead: str
 ) -> Report | None:
     """What the first engine finds that opens the workbook and knows all its formulas."""
+    from kfsheet.workbook.engines.libreoffice import libreoffice  # it takes long to import
+
     others = ["own", "libreoffice"] if libreoffice() else ["own"]
     for other in others:
         if other != engine:

@@ -8,18 +8,15 @@ from math import isnan
 from pathlib import Path
 from typing import Any
 
-from openpyxl.formula.translate import Translator
 from openpyxl.utils import get_column_letter
 
 from kfsheet.errors import DataError, WorkbookError
 from kfsheet.model.exercise import Exercise
 from kfsheet.model.quantities import Column
 from kfsheet.model.recurrence import Recurrence
-from kfsheet.parsing.calculator import Formula
 from kfsheet.parsing.references import Address
 from kfsheet.workbook.engines.recalculate import start_engine
 from kfsheet.workbook.engines.spreadsheet_engine import CellValue, Changes, Engine, Values
-from kfsheet.workbook.reading.book import Book, read_book
 from kfsheet.workbook.reading.package import Package
 from kfsheet.workbook.write.layout import (
     EXERCISE_NAME,
@@ -81,16 +78,20 @@ class OpenedWorkbook:
 
     def text(self, address: Address) -> str | None:
         """The formula in a cell, written out where it is shared."""
+        from openpyxl.formula.translate import Translator  # seldom needed
+
         sheet, *cell = address
-        content = self._book.sheets.get(sheet, {}).get(tuple(cell))
-        if not isinstance(content, Formula):
+        content = self._cells.get(sheet, {}).get(tuple(cell))
+        if not hasattr(content, "host"):  # a constant
             return None
         here, there = (f"{get_column_letter(c)}{r}" for r, c in (content.host, cell))
         return Translator(content.text, here).translate_formula(there)
 
     @cached_property
-    def _book(self) -> Book:
-        return read_book(self.package.container)
+    def _cells(self) -> dict[str, dict[tuple[int, int], Any]]:
+        from kfsheet.workbook.reading.book import read_book  # it takes long to import
+
+        return read_book(self.package.container).sheets
 
     @property
     def exercise_hint(self) -> str:

@@ -11,12 +11,9 @@ from pathlib import Path
 from kfsheet.errors import KfsheetError
 from kfsheet.parsing.calculator import Error, Formula, SheetCalculator
 from kfsheet.parsing.references import Cell
-from kfsheet.workbook.engines.spreadsheet_engine import CellValue, Changes, Values
+from kfsheet.workbook.engines.spreadsheet_engine import UNREAD, CellValue, Changes, Values
 from kfsheet.workbook.reading.archive import Container, refusing
 from kfsheet.workbook.reading.book import read_book
-
-UNREAD = "#ERROR!"
-"""The value of a formula that cannot be calculated."""
 
 
 class Own:

@@ -12,7 +12,6 @@ import re
 import zipfile
 from io import BytesIO
 from xml.etree.ElementTree import Element
-from xml.sax.saxutils import quoteattr
 
 from kfsheet.errors import UnreadableFileError
 from kfsheet.workbook.reading.archive import (
@@ -22,7 +21,6 @@ from kfsheet.workbook.reading.archive import (
     local_name,
     plain_name,
 )
-from kfsheet.workbook.reading.plain_xml import plain_xml
 
 TYPES = "[Content_Types].xml"
 WORKSHEET = re.compile(r"xl/worksheets/[^/\\%]+\.xml")
@@ -46,7 +44,7 @@ HEAD = re.compile(
     rb'\s*<(?:workbook|worksheet|sst|styleSheet)\b[^>]*\sxmlns="%s"' % re.escape(MAIN.encode()),
     re.DOTALL,
 )
-ODD = (b"<!-", b"<![", b't="d"')
+ODD = (b"<!", b't="d"')
 # A cell or a row whose address is not found by a quick look.
 UNPLACED = re.compile(rb'<c(?=[\s/>])(?! r="[A-Z])|<row(?=[\s/>])(?![^<>]* r="[1-9])')
 CHOICE = b"AlternateContent"
@@ -119,7 +117,10 @@ def _source(container: Container, relations: str) -> str | None:
 def _is_plain(xml: bytes) -> bool:
     if not HEAD.match(xml[:10_000]) or any(word in xml for word in ODD) or UNPLACED.search(xml):
         return False
-    return xml.find(CHOICE, 0, xml.find(b"</sheetData>") + 1) < 0  # after the cells it is a drawing
+    choice = xml.find(CHOICE)
+    return (
+        choice < 0 or xml.find(b"</sheetData>", 0, choice) >= 0
+    )  # after the cells it is a drawing
 
 
 def _links_are_exact(container: Container) -> bool:
@@ -145,6 +146,8 @@ def _links_are_exact(container: Container) -> bool:
 def _rewritten(
     container: Container, names: dict[str, str], odd: set[str], strict: bool
 ) -> bytes:  # fmt: skip
+    from kfsheet.workbook.reading.plain_xml import plain_xml  # it takes long to import
+
     result = BytesIO()
     with zipfile.ZipFile(result, "w", zipfile.ZIP_DEFLATED) as new:
         for old, name in names.items():
@@ -189,6 +192,8 @@ def _types(container: Container, part: str, names: dict[str, str]) -> bytes:
 
 def _plain_tree(root: Element) -> bytes:
     """A flat list of elements, as relations and types are, without prefixes."""
+    from xml.sax.saxutils import quoteattr  # it takes long to import
+
     space = root.tag[1:].partition("}")[0]
     items = "".join(
         f"<{local_name(i.tag)} {' '.join(f'{k}={quoteattr(v)}' for k, v in i.attrib.items())}/>"
