@@ -39,12 +39,13 @@ from kfsheet.coursework.judging.diagnosis import (
 from kfsheet.coursework.judging.formula_meaning import Interpreter, forbidden
 from kfsheet.coursework.judging.model_runs import ModelRuns
 from kfsheet.coursework.judging.random_samples import OwnNumbers, Sampler
+from kfsheet.coursework.judging.rearrangements import rearrangements
 from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.coursework.reading.submission import Book
 from kfsheet.coursework.reading.worksheet import Formula
 from kfsheet.errors import ForbiddenError, KfsheetError
 from kfsheet.model.exercise import Question
-from kfsheet.model.expressions import columns_read
+from kfsheet.model.recurrence import Recurrence
 from kfsheet.parsing.calculator import TooMuchWorkError
 from kfsheet.parsing.references import relative_key
 
@@ -86,6 +87,7 @@ class Judge:
         recalculated: Recalculated,
     ) -> None:
         self._exercise, self._model, self._sampler = runs.exercise, runs.model, sampler
+        self._runs = runs
         self.book, self._recalculated = book, recalculated
         self.addresses = CellAddresses.find(book, runs.model)
         self._calculated = CalculatedAnswers(book, self.addresses, runs, own)
@@ -230,28 +232,19 @@ class Judge:
         return f"it goes in a circle: {' -> '.join(circle)}" if circle else ""
 
     def _repeats(self, name: str, cell: AnswerCell) -> str:
-        """Words, if the answer is copied from a column that hides its formula."""
-        given = [
-            v for v in self._exercise.veiled
-            if v in self._model.table and v not in self._ancestors(name)
-        ]  # fmt: skip
-        if not given or not self._calculated.reads(_rows(given, self._model.rows), cell.address):
+        """Words, if the answer is a given quantity in other words."""
+        known = rearrangements(self._runs)
+        # What follows for few answers is looked for only if there is something to ask of it.
+        if not self._reads(known.strangers(name), cell):
             return ""
-        for column in given:
-            if self._calculated.reads(_rows([column], self._model.rows), cell.address):
-                return f"{column} repeats the answer; derive it"
-        return ""
+        forbidden = sorted(known.forbidden(name))
+        if not self._reads(forbidden, cell):
+            return ""
+        culprit = next(n for n in forbidden if self._reads([n], cell))
+        return f"{culprit} repeats the answer; derive it"
 
-    def _ancestors(self, name: str) -> set[str]:
-        """The columns from which an answer follows: they may be read, or written out."""
-        found: set[str] = set()
-        waiting = [name]
-        while waiting:
-            quantity = self._model.table.get(waiting.pop()) or self._model.derived_scalars.get(name)
-            more = {c for rule in quantity.rules for c in columns_read(rule)} - found
-            found |= more
-            waiting += [c for c in more if c in self._model.table]
-        return found
+    def _reads(self, names: list[str], cell: AnswerCell) -> bool:
+        return bool(names) and self._calculated.reads(_rows(names, self._model), cell.address)
 
     # -- from cells to a mark --------------------------------------------------------------
 
@@ -321,8 +314,10 @@ def _only_gaps(cells: list[AnswerCell]) -> bool:
     return filled and bool(wrong) and all(o.world.gaps for o in wrong)
 
 
-def _rows(names: list[str], rows: int) -> Iterator[tuple[str, int]]:
-    return ((name, step) for name in names for step in range(rows))
+def _rows(names: list[str], model: Recurrence) -> Iterator[tuple[str, int]]:
+    """All cells of columns and scalars."""
+    columns = model.table
+    return ((n, step) for n in names for step in range(model.rows if n in columns else 1))
 
 
 def _alike(cells: list[AnswerCell]) -> list[list[AnswerCell]]:
