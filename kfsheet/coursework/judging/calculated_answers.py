@@ -20,6 +20,7 @@ from kfsheet.parsing.references import Address, Cell
 
 TOLERANCE = 1e-9  # an answer that adds in another order rounds in another way
 SMALL = 1e-4  # of a column's root mean square: differences of large numbers are small and rough
+MOVED = 1.37  # of its value, and a little more
 WORK = 200_000  # operations of one formula
 SECONDS = 2.0  # of one answer, all rows and worlds together
 Value = float | str | bool | Error | None
@@ -87,6 +88,18 @@ class CalculatedAnswers:
             if place := self._addresses.of(name, step):
                 spoilt[place[0]][place[1:]] = Error.CIRC
         return self._base.with_values(spoilt).formula_value(address) is Error.CIRC
+
+    def follows(self, cells: Iterable[tuple[str, int]], address: Address) -> bool:
+        """Whether the value of the formula in a cell moves with cells of the model."""
+        world = self._own[0]
+        moved: Cells = {sheet: dict(found) for sheet, found in self._cells(world).items()}
+        for name, step in cells:
+            if (place := self._addresses.of(name, step)) and place[0] in moved:
+                value = moved[place[0]].get(place[1:])
+                if type(value) is float:
+                    moved[place[0]][place[1:]] = MOVED * value + world.sizes.get(name, 1.0)
+        found = self._base.with_values(moved).formula_value(address)
+        return not same(found, self._sheet(world).formula_value(address))
 
     def works(self, name: str, address: Address) -> bool:
         """Whether a cell, calculated in the student's own file, has the key's value."""

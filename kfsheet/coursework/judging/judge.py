@@ -199,7 +199,8 @@ class Judge:
             for cell in {right[0].step: right[0], right[-1].step: right[-1]}.values():
                 if words := self._circle(name, cell):
                     return words
-            return self._repeats(name, right[0])
+            some = {right[n].step: right[n] for n in (0, len(right) // 2, -1)}
+            return next(filter(None, (self._repeats(name, c) for c in some.values())), "")
         except KfsheetError:
             return ""
 
@@ -244,7 +245,12 @@ class Judge:
         return f"{culprit} repeats the answer; derive it"
 
     def _reads(self, names: list[str], cell: AnswerCell) -> bool:
-        return bool(names) and self._calculated.reads(_rows(names, self._model), cell.address)
+        """Whether an answer needs one of some columns and scalars, be it behind an IFERROR."""
+        cells = list(_rows(names, self._model))
+        known = self._calculated
+        return bool(cells) and (
+            known.reads(cells, cell.address) or known.follows(cells, cell.address)
+        )
 
     # -- from cells to a mark --------------------------------------------------------------
 

@@ -217,7 +217,7 @@ class _Search:
 
 
 def _samples(of: Rearrangements, name: str) -> list[tuple[World, int]]:
-    """Rows of worlds in which an answer has a value, of each world in turn."""
+    """Rows of worlds in which an answer has a value, and not 0, of each world in turn."""
     worlds, column = of.runs.worlds, of.model.table.get(name)
     first = len(column.start) if column else 0
     there = []
@@ -225,7 +225,7 @@ def _samples(of: Rearrangements, name: str) -> list[tuple[World, int]]:
         rows = [
             row
             for row in range(max(first, 1), of.model.rows)
-            if not column or not np.isnan(world.columns[name][row])
+            if not column or abs(world.columns[name][row]) > 0
         ]
         picked = rows[n % 2 :: max(1, len(rows) * len(worlds) // SAMPLES)]
         if picked:
