@@ -32,6 +32,7 @@ from kfsheet.coursework.judging.recalculated_answers import Recalculation
 from kfsheet.coursework.reading.cell_addresses import named_cell
 from kfsheet.coursework.reading.submission import Book, read_submission
 from kfsheet.coursework.reports.marked_workbook import mark_workbook
+from kfsheet.coursework.reports.origin import Numbers, strange_numbers
 from kfsheet.errors import KfsheetError, SubmissionError
 from kfsheet.exercises import load_exercise
 from kfsheet.files import write_file
@@ -39,6 +40,7 @@ from kfsheet.model.exercise import Exercise
 from kfsheet.workbook.write.layout import TOKEN_NAME
 
 GRADED, UNTOUCHED, NO_TOKEN, OTHER = "graded", "untouched", "no token", "other exercise"
+NOT_OWN = "not own data"
 
 
 @dataclass
@@ -54,6 +56,9 @@ class Assessment:
 
     final: bool = True
     """Whether it would be the same on a machine that has more time."""
+
+    numbers: Numbers = field(default_factory=dict)
+    """Those of the file, if they are not the student's own."""
 
     @property
     def score(self) -> float:
@@ -99,6 +104,9 @@ def assess(spec: str, secret: bytes, path: Path, copy: Path | None = None) -> As
         own = own_numbers(exercise, secret, student)
         recalculation = Recalculation(path, runs)
         judge = Judge(runs, sampler, book, own, recalculation)
+        if numbers := strange_numbers(exercise, book, judge.addresses, own):
+            words = "parameters and data are not those that this student was given"
+            return Assessment(NOT_OWN, words, student, numbers=numbers)
         marks = judge.marks()
         if all(mark.status == EMPTY for mark in marks):
             return Assessment(UNTOUCHED, "no answer was filled in", student, marks)

@@ -16,7 +16,15 @@ from kfsheet.coursework.handout import course_secret
 from kfsheet.coursework.judging.judge import Mark
 from kfsheet.coursework.reading.roster import Student
 from kfsheet.coursework.reading.submitted_files import owner, submitted_files
-from kfsheet.coursework.reports.assessment import GRADED, NO_TOKEN, OTHER, Assessment, assess
+from kfsheet.coursework.reports.assessment import (
+    GRADED,
+    NO_TOKEN,
+    NOT_OWN,
+    OTHER,
+    Assessment,
+    assess,
+)
+from kfsheet.coursework.reports.origin import holder
 from kfsheet.coursework.worker_pool import SECONDS, Failed, Pool, run_on
 from kfsheet.files import write_file
 from kfsheet.model.exercise import Exercise
@@ -30,6 +38,8 @@ STATUSES = {
     FOREIGN: "the file was handed out to another student; it does not count",
     NO_TOKEN: "the file was not handed out to anybody, or its token was removed",
     OTHER: "the file belongs to another exercise",
+    NOT_OWN: "the file holds other numbers than those handed out to this student; it does not "
+    "count",
     "empty file": "the file has 0 bytes",
     "wrong kind": "the file is no .xlsx workbook, whatever its name says",
     "damaged": "the workbook cannot be opened",
@@ -59,6 +69,9 @@ class Result:
     changed: bool = False
     """Whether a lecturer has changed a mark."""
 
+    note: str = ""
+    """For the lecturer only."""
+
     @property
     def score(self) -> float:
         """Points, a lecturer's own total included."""
@@ -73,6 +86,8 @@ class Handed:
     owner: Student | None
     key: str
     assessment: Assessment
+    numbers_of: str = ""
+    """Whose numbers the file holds, if not those of whose token it carries."""
 
     @property
     def of_nobody(self) -> bool:
@@ -136,12 +151,24 @@ def grade(
 
     judged = _judged(keys, spec, secret, out / "work", run, progress)
     by_id = {student.id: student for student in students}
-    handed = [
-        Handed(path, owner(path, folder, students, by_id.get(found.student)), keys[path], found)
-        for path, found in ((path, judged[keys[path]]) for path in files)
-    ]
+    origin = _origins(exercise, secret, students, judged)
+    handed = []
+    for path in files:
+        found = judged[keys[path]]
+        whose = owner(path, folder, students, by_id.get(found.student))
+        handed.append(Handed(path, whose, keys[path], found, origin.get(keys[path], "")))
     maximum = sum(question.points for question in exercise.questions)
     return [_result(student, handed, maximum) for student in students], handed
+
+
+def _origins(
+    exercise: Exercise, secret: bytes, students: Sequence[Student], judged: dict[str, Assessment]
+) -> dict[str, str]:
+    """Who was given the numbers of files that are not their students' own."""
+    strange = {key: found for key, found in judged.items() if found.status == NOT_OWN}
+    return {
+        key: holder(found.numbers, exercise, secret, students) for key, found in strange.items()
+    }
 
 
 def _key(path: Path, version: str, secret: bytes) -> str:
@@ -218,8 +245,14 @@ def _result(student: Student, handed: list[Handed], maximum: int) -> Result:
     remark = "; ".join([found.remark, *others] if found.remark else others)
     return Result(
         student, maximum, found.status, remark, found.marks, chosen.path, chosen.key,
-        found.feedback,
+        found.feedback, note=_note(chosen),
     )  # fmt: skip
+
+
+def _note(chosen: Handed) -> str:
+    if chosen.assessment.status != NOT_OWN:
+        return ""
+    return f"the numbers are those of {chosen.numbers_of or 'nobody on the roster'}"
 
 
 def _others(student: Student, chosen: Handed, files: list[Handed]) -> list[str]:
