@@ -6,6 +6,7 @@ from collections import Counter, defaultdict
 from html import escape
 
 from kfsheet.coursework.judging.diagnosis import RIGHT
+from kfsheet.coursework.reading.submitted_files import readable
 from kfsheet.coursework.reports.assessment import NOT_OWN
 from kfsheet.coursework.reports.class_charts import (
     answers_by_status,
@@ -67,7 +68,15 @@ def _groups(judged: list[Result]) -> str:
 def _foreign(results: list[Result], handed: list[Handed]) -> str:
     names = {r.student.id for r in results}
     rows = [
-        ("", (h.path.name, h.owner.id if h.owner else "", h.assessment.student, _numbers_of(h)))
+        (
+            "",
+            (
+                readable(h.path.name),
+                h.owner.id if h.owner else "",
+                h.assessment.student,
+                _numbers_of(h),
+            ),
+        )
         for h in handed
         if h.assessment.student
         and (
@@ -87,7 +96,7 @@ def _numbers_of(file: Handed) -> str:
 
 def _lost(handed: list[Handed]) -> str:
     rows = [
-        ("", (h.path.name, h.assessment.status, h.assessment.remark, OF_NOBODY))
+        ("", (readable(h.path.name), h.assessment.status, h.assessment.remark, OF_NOBODY))
         for h in handed
         if h.of_nobody
     ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor
@@ -15,7 +16,7 @@ from kfsheet import __version__
 from kfsheet.coursework.handout import course_secret
 from kfsheet.coursework.judging.judge import Mark
 from kfsheet.coursework.reading.roster import Student
-from kfsheet.coursework.reading.submitted_files import owner, submitted_files
+from kfsheet.coursework.reading.submitted_files import owner, readable, submitted_files
 from kfsheet.coursework.reports.assessment import (
     GRADED,
     NO_TOKEN,
@@ -26,6 +27,7 @@ from kfsheet.coursework.reports.assessment import (
 )
 from kfsheet.coursework.reports.origin import holder
 from kfsheet.coursework.worker_pool import SECONDS, Failed, Pool, run_on
+from kfsheet.errors import UnwrittenError
 from kfsheet.files import write_file
 from kfsheet.model.exercise import Exercise
 
@@ -179,7 +181,7 @@ def _key(path: Path, version: str, secret: bytes) -> str:
             for block in iter(lambda: file.read(2**20), b""):
                 content.update(block)
     except OSError:
-        content.update(str(path).encode())
+        content.update(os.fsencode(path))
     parts = ("key", version, __version__, content.hexdigest())
     return course_secret.digest(secret, *parts).hex()[:32]
 
@@ -209,17 +211,24 @@ def _judged(
     for path, found in progress(judged, len(tasks)):
         known[names[path]] = found
         if found.final:  # else the machine was busy, and the next run tries again
-            content = json.dumps(found.as_dict()).encode()
-            write_file(work / f"{names[path]}.json", content)
+            _keep(found, work / f"{names[path]}.json")
     return known
 
 
-def _kept(work: Path, key: str) -> Assessment | None:
-    """The result of an earlier run; one that was damaged is made anew."""
+def _keep(found: Assessment, path: Path) -> None:
     try:
-        return Assessment.from_dict(json.loads((work / f"{key}.json").read_text()))
+        write_file(path, json.dumps(found.as_dict()).encode())
+    except UnwrittenError as error:  # it is judged again in the next run
+        found.unwritten = str(error)
+
+
+def _kept(work: Path, key: str) -> Assessment | None:
+    """The result of an earlier run; one that was damaged, or lost its copy, is made anew."""
+    try:
+        found = Assessment.from_dict(json.loads((work / f"{key}.json").read_text()))
     except (OSError, ValueError, TypeError, KeyError):
         return None
+    return found if (work / f"{key}.xlsx").is_file() or not found.feedback else None
 
 
 def _assessment(found: Assessment | Failed) -> Assessment:
@@ -263,7 +272,8 @@ def _others(student: Student, chosen: Handed, files: list[Handed]) -> list[str]:
     named = Counter(h.path.name for h in files)
 
     def name(file: Handed) -> str:
-        return "/".join(file.path.parts[-2 if named[file.path.name] > 1 else -1 :])
+        parts = file.path.parts[-2 if named[file.path.name] > 1 else -1 :]
+        return "/".join(map(readable, parts))
 
     def shown(file: Handed) -> str:
         found = file.assessment

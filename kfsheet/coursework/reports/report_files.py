@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from html import escape
 from pathlib import Path
+from typing import Any
 
 from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.coursework.reading.submission import read_submission
@@ -12,6 +14,7 @@ from kfsheet.coursework.reports.gradebooks import gradebooks, points_shown
 from kfsheet.coursework.reports.grading import STATUSES, Handed, Result
 from kfsheet.coursework.reports.html_pages import page, table
 from kfsheet.coursework.reports.marked_workbook import colour_of, mark_workbook
+from kfsheet.errors import UnwrittenError
 from kfsheet.files import write_file
 from kfsheet.model.exercise import Exercise
 
@@ -19,20 +22,43 @@ from kfsheet.model.exercise import Exercise
 def write_reports(
     exercise: Exercise, results: list[Result], handed: list[Handed], out: str | Path
 ) -> list[Path]:
-    """Write every report into ``out`` and return the files for the lecturer."""
-    out = Path(out)
-    for result in results:
-        _write_feedback(exercise, result, out)
+    """Write every report into ``out`` and return the files for the lecturer.
+
+    Raises
+    ------
+    UnwrittenError
+        If some could not be written, naming them; all others are there.
+    """
+    out, unwritten = Path(out), []
     texts = gradebooks(exercise, results) | {"class.html": class_page(exercise, results, handed)}
-    return [write_file(out / name, text.encode()) for name, text in texts.items()]
+    written = [_try(unwritten, _write_text, out / name, text) for name, text in texts.items()]
+    for result in results:
+        _try(unwritten, _write_feedback, exercise, result, out)
+    if unwritten:
+        more = f" (and {len(unwritten) - 1} more files)" if len(unwritten) > 1 else ""
+        raise UnwrittenError(f"{unwritten[0]}; then grade again{more}")
+    return written
+
+
+def _try(unwritten: list[UnwrittenError], write: Callable, *what: Any) -> Any:
+    """Write a report; one that cannot be written keeps no other from it."""
+    try:
+        return write(*what)
+    except UnwrittenError as error:
+        unwritten.append(error)
+
+
+def _write_text(path: Path, text: str) -> Path:
+    # What no program can have written, half a character, is shown as a code and stops nothing.
+    return write_file(path, text.encode(errors="backslashreplace"))
 
 
 def _write_feedback(exercise: Exercise, result: Result, out: Path) -> None:
     """A student's page, and the marked workbook if one could be made."""
     folder, name = out / "feedback", result.student.id
-    write_file(folder / f"{name}.html", _student_page(exercise, result).encode())
     target = folder / f"{name}.xlsx"
     target.unlink(missing_ok=True)  # of an earlier run, when another file counted
+    _write_text(folder / f"{name}.html", _student_page(exercise, result))
     marked = out / "work" / f"{result.key}.xlsx"
     if result.feedback and result.changed:
         write_file(target, _marked_anew(exercise, result))
