@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from sympy import Add, Basic, Indexed, IndexedBase, Mul, Number, Piecewise, Pow
 
 from kfsheet.coursework.judging.model_runs import ModelRuns, World
-from kfsheet.model.expressions import columns_read, scalars, t
+from kfsheet.model.expressions import REMEMBERED, columns_read, scalars, t
 from kfsheet.model.quantities import Column, Scalar
 from kfsheet.model.schedule import same_row
 
@@ -57,6 +57,7 @@ class Rearrangements:
         ]
         self.names = [*model.parameters, *(n for n in self.items if n not in numbers)]
         self._found: dict[str, dict[str, bool]] = {}
+        self._others: dict[str, dict[str, set[str]]] = {}
 
     def forbidden(self, name: str) -> frozenset[str]:
         """Given columns and scalars that may not be read for an answer, and what follows from them.
@@ -105,10 +106,16 @@ class Rearrangements:
 
     def steps(self, given: str, name: str) -> int:
         """Operations from what an answer builds on to a given quantity."""
-        own = set(self.given) - self.ancestors(name)
-        found = _closed({n: self._reads[n] & own for n in own}, {given})
+        found = _closed(self._apart(name), {given})
         loop = any(given in self._reads[n] for n in found)
         return sum(operations(self.items[n].rules[-1]) for n in found) + (STEP + 1) * loop
+
+    def _apart(self, name: str) -> dict[str, set[str]]:
+        """What given quantities read of each other, but for those that an answer builds on."""
+        if name not in self._others:
+            own = set(self.given) - self.ancestors(name)
+            self._others[name] = {n: self._reads[n] & own for n in own}
+        return self._others[name]
 
     def _followers(self, names: set[str], reads: dict[str, set[str]] | None = None) -> set[str]:
         reads = self._reads if reads is None else reads
@@ -307,6 +314,7 @@ def _names(rule: Basic) -> set[str]:
     return {s.name for s in scalars(rule) if s != t} | columns_read(rule)
 
 
+@lru_cache(maxsize=REMEMBERED)
 def operations(rule: Basic) -> int:
     """Operations of an expression; a sign or a factor that is a number is none.
 
