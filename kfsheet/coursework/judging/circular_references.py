@@ -32,6 +32,20 @@ def circular_reference(book: Book, addresses: CellAddresses, name: str, step: in
     return []
 
 
+def quantities_named(book: Book, addresses: CellAddresses, start: Address) -> set[str]:
+    """Columns and scalars to which a formula refers, itself or through cells beside the tables."""
+    waiting, seen, found = [start], {start}, set()
+    while waiting and len(seen) < MOST:
+        for cell in _read_by(book, waiting.pop()):
+            role = addresses.role(cell)
+            if role is not None:
+                found.add(role[0] if isinstance(role, tuple) else role)
+            elif cell not in seen:
+                seen.add(cell)
+                waiting.append(cell)
+    return found
+
+
 def _read_by(book: Book, cell: Address) -> Iterator[Address]:
     """What the text of a formula refers to, whatever its value makes of it."""
     content = book.sheets[cell[0]].get(cell[1:])

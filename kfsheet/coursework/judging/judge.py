@@ -19,7 +19,10 @@ from openpyxl.utils import FORMULAE
 from kfsheet.coursework.judging.answer_key import asked_steps
 from kfsheet.coursework.judging.answer_rows import AnswerCell, content_of, not_in, rows_of
 from kfsheet.coursework.judging.calculated_answers import CalculatedAnswers
-from kfsheet.coursework.judging.circular_references import circular_reference
+from kfsheet.coursework.judging.circular_references import (
+    circular_reference,
+    quantities_named,
+)
 from kfsheet.coursework.judging.diagnosis import (
     EMPTY,
     GAPS,
@@ -109,7 +112,7 @@ class Judge:
         # An engine calculates the whole workbook several times over: only where nothing else can.
         if any(_may_be_known(cell) for cell in cells):
             found = self._recalculated(self.addresses, asked.name)
-            cells = [_decided(cell, found) for cell in cells]
+            cells = [self._own_work(asked.name, _decided(c, found), c) for c in cells]
         return self._marked(asked, cells)
 
     def _found(self, name: str, step: int) -> AnswerCell | None:
@@ -243,6 +246,15 @@ class Judge:
             return ""
         culprit = next(n for n in forbidden if self._reads([n], cell))
         return f"{culprit} repeats the answer; derive it"
+
+    def _own_work(self, name: str, cell: AnswerCell, before: AnswerCell) -> AnswerCell:
+        """A cell that an engine has found right, unless its text names what repeats the answer."""
+        if cell is before or cell.status != RIGHT:
+            return cell
+        named = quantities_named(self.book, self.addresses, cell.address)
+        repeats = sorted(named & rearrangements(self._runs).forbidden(name))
+        words = f"{repeats[0]} repeats the answer; derive it" if repeats else ""
+        return replace(cell, status=WRONG, words=words) if repeats else cell
 
     def _reads(self, names: list[str], cell: AnswerCell) -> bool:
         """Whether an answer needs one of some columns and scalars, be it behind an IFERROR."""
