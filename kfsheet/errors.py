@@ -21,6 +21,10 @@ class WorkbookError(KfsheetError):
     """A file is not a workbook, is not one of ours, or lost a part of itself."""
 
 
+class UnwrittenError(WorkbookError):
+    """A file was not written: the disk is full, or nobody may write there."""
+
+
 class EngineError(KfsheetError):
     """A spreadsheet engine or a compiler is missing, crashed or ran out of time."""
 

@@ -73,8 +73,9 @@ class Exercise:
     task : tuple of str
         What a student must know to answer the questions, such as the model's equations in words.
     veiled : tuple of str
-        Columns and derived scalars that stay live in handouts, but hide their formulas: they repeat
-        an answer's, or a part of it.
+        Columns and derived scalars that stay live in handouts, but hide their formulas, and from
+        which an answer may not be computed, unless it builds on them. What is plainly an answer in
+        other words, or shows its formula, is found without being named here.
     sealed : tuple of str
         Worksheets whose given formulas stay live in handouts, but are hidden: they look like an
         answer's, for another axis or camera. An answer may read them.

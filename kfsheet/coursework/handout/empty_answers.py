@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 
 from kfsheet.coursework.handout.questions_sheet import SHEET
+from kfsheet.coursework.handout.shown_answers import shown_answers
 from kfsheet.model.exercise import Exercise, asked_steps
 from kfsheet.workbook.write.layout import FIRST_ROW, WORDS_ROW, Layout
 from kfsheet.workbook.write.run import Run
@@ -37,7 +38,7 @@ def with_empty_answers(exercise: Exercise, layout: Layout, now: Run) -> list[She
         _freeze(pages[section])
     for section in exercise.sealed:
         _seal(pages[section])
-    for name in exercise.veiled:
+    for name in sorted(shown_answers(exercise)):
         _veil(pages, layout, name)
     _mend_read_me(pages["Read me"], exercise)
     pages["Parameters"].put(2, 1, "These are your own numbers; everything follows from them.")

@@ -13,7 +13,6 @@ from collections import Counter
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import inf
 
 from openpyxl.utils import FORMULAE
 
@@ -26,7 +25,6 @@ from kfsheet.coursework.judging.answer_rows import (
     shape,
 )
 from kfsheet.coursework.judging.calculated_answers import SECONDS, CalculatedAnswers
-from kfsheet.coursework.judging.dependencies import ancestors, delays
 from kfsheet.coursework.judging.mistakes.diagnosis import (
     EMPTY,
     GAPS,
@@ -45,11 +43,9 @@ from kfsheet.coursework.judging.mistakes.diagnosis import (
 )
 from kfsheet.coursework.judging.mistakes.known_mistakes import KnownMistakes
 from kfsheet.coursework.judging.model_runs import ModelRuns, OwnNumbers, World
+from kfsheet.coursework.judging.own_work import OwnWork
 from kfsheet.coursework.judging.precedents import (
-    circle_in_words,
     forbidden_precedent,
-    own_cells,
-    precedents,
 )
 from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.coursework.reading.formula_text import forbidden
@@ -111,11 +107,19 @@ class Judge:
         self.addresses = CellAddresses.find(book, runs.model)
         worlds = (*runs.own_worlds(own), *runs.worlds)
         self.calculated = CalculatedAnswers(book, self.addresses, worlds)
+        self._own_work = OwnWork(runs, book, self.addresses, self.calculated)
         self._diagnosis = Diagnosis(book, self.addresses, self.calculated, runs, mistakes, own)
 
     def marks(self) -> list[Mark]:
         """One mark for each question."""
-        return [self._mark(asked) for asked in self._exercise.questions]
+        return [self._mark_or_reason(asked) for asked in self._exercise.questions]
+
+    def _mark_or_reason(self, asked: Question) -> Mark:
+        try:
+            return self._mark(asked)
+        except (Exception, OutOfTimeError) as error:  # a defect of ours costs one answer only
+            words = f"judging it failed ({type(error).__name__}: {error}); look at it by hand"
+            return Mark(asked.name, asked.points, 0.0, UNREADABLE, words)
 
     def _mark(self, asked: Question) -> Mark:
         cells = [self._found(asked.name, step) for step in asked_steps(self._model, asked.name)]
@@ -128,7 +132,7 @@ class Judge:
         # An engine calculates the whole workbook several times over: only where nothing else can.
         if any(_may_be_known(cell) for cell in cells):
             found = self._recalculated(self.addresses, asked.name)
-            cells = [_decided(cell, found) for cell in cells]
+            cells = [self._decided(asked.name, cell, found) for cell in cells]
         first = next((cell for cell in cells if cell.status != RIGHT), None)
         return replace(self._marked(asked, cells), **looked_at(self.book, cells, first))
 
@@ -168,7 +172,7 @@ class Judge:
         if _only_gaps(found):
             found = [replace(cell, status=WRONG) for cell in found]
         right = [cell for cell in found if cell.status == RIGHT]
-        if right and (words := self._not_its_own(name, right)):
+        if right and (words := self._own_work.objection(name, right)):
             found = [replace(c, status=WRONG, words=words) if c in right else c for c in found]
         yield from found
         steps = {cell.step for cell in found}
@@ -225,44 +229,15 @@ class Judge:
         words = forbidden_precedent(self.book, self.addresses, cell.address)
         return f"{words} is not allowed" if words else ""
 
-    def _not_its_own(self, name: str, right: list[AnswerCell]) -> str:
-        """Words, if an answer with the right values is computed from itself, or copied."""
-        ends = {right[0].step: right[0], right[-1].step: right[-1]}.values()
-        for cell in right if any(self._mentions_itself(name, cell) for cell in ends) else ends:
-            if words := self._circle(name, cell):
-                return words
-        return self._repeats(name, right[0])
-
-    def _follows(self, name: str, cell: AnswerCell) -> Callable[[str, int], bool]:
-        after = delays(self._model, name)
-        return lambda other, step: step - cell.step >= after.get(other, inf)
-
-    def _mentions_itself(self, name: str, cell: AnswerCell) -> bool:
-        """Whether the text of a formula names a cell that follows from it, used or not."""
-        follows = self._follows(name, cell)
-        own = own_cells(self.book, self.addresses, cell.address)
-        roles = (self.addresses.role(c) for o in own for c in precedents(self.book, o))
-        return any(follows(*((r, 0) if isinstance(r, str) else r)) for r in roles if r)
-
-    def _circle(self, name: str, cell: AnswerCell) -> str:
-        if not self.calculated.needs(self._follows(name, cell), cell.address):
-            return ""
-        # Who reads the analysis for the innovation may have written the analysis without it.
-        if self.calculated.works(name, cell.step, cell.address):
-            return ""
-        return (
-            circle_in_words(self.book, cell.address)
-            or "it goes in a circle: it needs its own result"
-        )
-
-    def _repeats(self, name: str, cell: AnswerCell) -> str:
-        """Words, if the answer is copied from a column that hides its formula."""
-        for veiled in self._exercise.veiled:
-            if veiled in ancestors(self._model, name):
-                continue
-            if self.calculated.needs(lambda other, _, v=veiled: other == v, cell.address):
-                return f"{veiled} repeats the answer; derive it"
-        return ""
+    def _decided(self, name: str, cell: AnswerCell, found: dict[int, bool]) -> AnswerCell:
+        """A cell that an engine has judged where we could not."""
+        if cell.status != UNREADABLE or cell.step not in found:
+            return cell
+        if not found[cell.step]:
+            words = f"recalculated, since {cell.words}: other values than the key"
+            return replace(cell, status=WRONG, words=words)
+        words = self._own_work.objection_by_text(name, cell)
+        return replace(cell, status=WRONG if words else RIGHT, words=words)
 
     # -- from cells to a mark --------------------------------------------------------------
 
@@ -343,15 +318,6 @@ def _may_be_known(cell: AnswerCell) -> bool:
     unknown = UNKNOWN.search(cell.words)
     known = not unknown or unknown[1] in FORMULAE
     return cell.status == UNREADABLE and known and not cell.words.startswith(GIVEN_UP)
-
-
-def _decided(cell: AnswerCell, found: dict[int, bool]) -> AnswerCell:
-    if cell.status != UNREADABLE or cell.step not in found:
-        return cell
-    if found[cell.step]:
-        return replace(cell, status=RIGHT, words="")
-    words = f"recalculated, since {cell.words}: other values than the key"
-    return replace(cell, status=WRONG, words=words)
 
 
 def _numbers_in_disguise(rest: list[AnswerCell]) -> bool:

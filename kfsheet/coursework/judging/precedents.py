@@ -73,6 +73,15 @@ def own_cells(book: Book, addresses: CellAddresses, start: Address) -> Iterator[
                 waiting.append(other)
 
 
+def quantities_named(
+    book: Book, addresses: CellAddresses, start: Address
+) -> Iterator[tuple[str, int]]:
+    """Columns, with their steps, and scalars to which a formula and its helper cells refer."""
+    for cell in own_cells(book, addresses, start):
+        for role in filter(None, map(addresses.role, precedents(book, cell))):
+            yield (role, 0) if isinstance(role, str) else role
+
+
 def forbidden_precedent(book: Book, addresses: CellAddresses, start: Address) -> str:
     """What a formula, or one of the student's own cells that it needs, must not use."""
     for sheet, *place in own_cells(book, addresses, start):

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from html import escape
 from pathlib import Path
+from typing import Any
 
 from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.coursework.reading.submission import read_submission
@@ -15,6 +17,7 @@ from kfsheet.coursework.reports.html_pages import page, table
 from kfsheet.coursework.reports.marked_workbook import mark_workbook
 from kfsheet.coursework.reports.marks_sheet import WHY, colour_of
 from kfsheet.coursework.reports.right_formulas import right_formulas
+from kfsheet.errors import UnwrittenError
 from kfsheet.files import write_file
 from kfsheet.model.exercise import Exercise
 
@@ -30,12 +33,34 @@ def write_reports(
     """Write every report into ``out`` and return the files for the lecturer.
 
     With ``show_key`` the students' files hold a right formula beside each answer.
+
+    Raises
+    ------
+    UnwrittenError
+        If some could not be written, naming them; all others are there.
     """
-    out = Path(out)
-    for result in results:
-        _write_feedback(exercise, result, out, show_key)
+    out, unwritten = Path(out), []
     texts = gradebooks(exercise, results) | {"class.html": class_page(exercise, results, handed)}
-    return [write_file(out / name, text.encode()) for name, text in texts.items()]
+    written = [_try(unwritten, _write_text, out / name, text) for name, text in texts.items()]
+    for result in results:
+        _try(unwritten, _write_feedback, exercise, result, out, show_key)
+    if unwritten:
+        more = f" (and {len(unwritten) - 1} more files)" if len(unwritten) > 1 else ""
+        raise UnwrittenError(f"{unwritten[0]}; then grade again{more}")
+    return written
+
+
+def _try(unwritten: list[UnwrittenError], write: Callable, *what: Any) -> Any:
+    """Write a report; one that cannot be written keeps no other from it."""
+    try:
+        return write(*what)
+    except UnwrittenError as error:
+        unwritten.append(error)
+
+
+def _write_text(path: Path, text: str) -> Path:
+    # What no program can have written, half a character, is shown as a code and stops nothing.
+    return write_file(path, text.encode(errors="backslashreplace"))
 
 
 def _write_feedback(exercise: Exercise, result: Result, out: Path, show_key: bool) -> None:
@@ -44,19 +69,18 @@ def _write_feedback(exercise: Exercise, result: Result, out: Path, show_key: boo
     target = folder / f"{name}.xlsx"
     target.unlink(missing_ok=True)  # of an earlier run, when another file counted
     marked = out / "work" / f"{result.key}.xlsx"
-    keys: dict[str, str] = {}
-    if result.marks and (show_key or (result.feedback and result.changed)):
+    anew = result.feedback and (show_key or result.changed)
+    book, keys = None, {}
+    if result.marks and (show_key or anew):
         book = read_submission(result.path)
         addresses = CellAddresses.find(book, exercise.model)
         keys = right_formulas(book, addresses, result.marks) if show_key else {}
-        if result.feedback:
-            content = mark_workbook(
-                result.path, book, addresses, result.marks, result.override, keys
-            )
-            write_file(target, content)
+    _write_text(folder / f"{name}.html", _student_page(exercise, result, keys))
+    if book and anew:
+        total = result.override
+        write_file(target, mark_workbook(result.path, book, addresses, result.marks, total, keys))
     elif result.feedback and marked.is_file():
         write_file(target, marked.read_bytes())
-    write_file(folder / f"{name}.html", _student_page(exercise, result, keys).encode())
 
 
 def _student_page(exercise: Exercise, result: Result, keys: dict[str, str]) -> str:

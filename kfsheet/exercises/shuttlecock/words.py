@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from kfsheet.exercises.shuttlecock.forecasts import NEWTON_STEPS
 from kfsheet.model.exercise import Question
 
 ABOUT = (
@@ -78,14 +77,4 @@ TASK = (
     "to W_4_raw are a step of Newton's method each, and W_4_raw counts as W. x_fall_raw is where "
     "the track then is. A track that stays below z_fall has no first guess, and then the rest of "
     "the row has no value either.",
-)
-ASKED_OF_Z = (
-    *("z_f", "vz_f", "az_f", "d_z", "S_z", "K_z_z", "K_vz_z", "z_a", "P_zz_a"),
-    *("p_z_raw", "v_z_raw"),
-)
-# What is asked of z stands beside it for x and y, and one step of Newton's is like another.
-TWINS = (
-    *(name.replace("z", axis) for axis in "xy" for name in ASKED_OF_Z),
-    "y_fall_raw",
-    *(f"W_{n}_raw" for n in range(2, NEWTON_STEPS + 1)),
 )
