@@ -7,6 +7,8 @@ right answer that loses points and every wrong one that gets all of them is prin
 """
 
 import argparse
+import os
+import shutil
 import sys
 import tempfile
 import time
@@ -23,6 +25,9 @@ MINI = str(HERE / "cases/submissions/mini.py")
 SHORT_CANNONBALL = str(HERE.parent / "fuzz/short_cannonball.py")
 SHARES = {"football": 8, "shuttlecock": 5, MINI: 5, SHORT_CANNONBALL: 2, "tennis": 1}
 """How many of the answers are for which exercise: short tables are quick."""
+
+KEEP = os.environ.get("KEEP_FILES") and Path(os.environ["KEEP_FILES"])
+"""Where files go whose marks are not deserved."""
 
 BATCH = 60  # answers to one question in one workbook
 
@@ -86,8 +91,9 @@ def _grade(course, answers, tally):
         for row in zip_longest(*columns):
             given = [pair for pair in row if pair]
             marks = course.marks([answer for answer, _ in given], path)
-            for answer, told in given:
-                _judged(course, answer, told, marks[answer.question.name], tally)
+            found = [_judged(course, a, told, marks[a.question.name], tally) for a, told in given]
+            if KEEP and any(found):
+                shutil.copy(path, KEEP / f"{course.exercise.name}_{sum(tally.counts.values())}.xlsx")
 
 
 def _judged(course, answer, told, mark, tally):
@@ -95,10 +101,12 @@ def _judged(course, answer, told, mark, tally):
     tally.counts[f"{told}: {mark.status}"] += 1
     full = getattr(mark, "points", None) == mark.score
     words = f"{course.exercise.name} {answer.kind} {answer} -> {mark.status} {mark.remark}"
+    words += f" [{answer.seen}]" if answer.seen and told == "wrong" else ""
     if told == "right" and not full:
         tally.lost.append(words)
     if told == "wrong" and full:
         tally.undeserved.append(words)
+    return (told == "right") != full
 
 
 def everywhere(count, seed, jobs=1, only=""):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import openpyxl
 from fuzz.mutations import mutated
-from fuzz.oracle import Oracle, cells_of, distance, runs, verdict
+from fuzz.oracle import Oracle, cells_of, runs, verdict
 from fuzz.papers import Paper
 from fuzz.question import Line, Question, key_cells
 from fuzz.rewritings import rewritten
@@ -29,10 +29,11 @@ class Answer:
 
     def __init__(self, question, rows, kind):
         self.question, self.rows, self.kind = question, rows, kind
+        self.seen = ""
 
     def __str__(self):
         line = self.rows[-1]
-        helpers = "".join(f"; H{n}: {c}" for n, (_, c) in enumerate(line.helpers))
+        helpers = "".join(f"; _{n}: {c}" for n, (_, c) in enumerate(line.helpers))
         return f"{self.question.name} row {line.row} {line.text}{helpers}"
 
 
@@ -81,6 +82,17 @@ class Course:
                 self.column_names[sheet, number] = name
                 rows = range(self.exercise.model.rows)
                 self.given |= {(sheet, FIRST_ROW + k, number) for k in rows}
+
+    def may_be_empty(self, place):
+        """Whether a place is that of a datum which some run does without, or of no cell at all."""
+        return place in self.gaps or (place is not None and place not in self.own_values)
+
+    @cached_property
+    def gaps(self):
+        columns = self.exercise.model.table.values()
+        homes = [self.layout.home(c.name) for c in columns if c.is_data and c.may_be_missing]
+        rows = range(FIRST_ROW, FIRST_ROW + self.exercise.model.rows)
+        return {(sheet, row, number) for sheet, number in homes for row in rows}
 
     @property
     def names(self):
@@ -163,10 +175,11 @@ class Course:
     def verdicts(self, answers):
         """right, wrong or unclear for each answer, as LibreOffice has it."""
         found = self.oracle.values(answers)
-        return [
-            verdict(values, self.wanted[answer.question.name])
-            for answer, values in zip(answers, found, strict=True)
-        ]
+        told = []
+        for answer, values in zip(answers, found, strict=True):
+            status, answer.seen = verdict(answer, values, self.wanted[answer.question.name])
+            told.append(status)
+        return told
 
     # -- marks -----------------------------------------------------------------------------
 

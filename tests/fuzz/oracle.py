@@ -76,7 +76,7 @@ class Oracle:
             far = free.get(HELPER_SHEET, FIRST)
             free[HELPER_SHEET] = far + width
             cells = cells_of(answer, column, letters, far)
-            for sheet, place, content in cells:
+            for sheet, place, content in (*cells, *given_above(question, column)):
                 changes.setdefault(sheet, {})[place] = content
             places.append((question.sheet, column, question.rows))
         books = calculated([paper.written(changes) for paper in self.papers])
@@ -103,6 +103,16 @@ def cells_of(answer, column, letters, far):
                 content = qualified(content, question.sheet) if elsewhere else content
             at = far + n if elsewhere else column_of(letters[n])
             yield HELPER_SHEET if elsewhere else question.sheet, (line.row, at), content
+
+
+def given_above(question, column):
+    """Cells that an answer's column holds without being asked."""
+    for row in question.copied - {*question.rows}:
+        place = question.sheet, row, question.column
+        formula = question.course.formulas.get(place)
+        content = f"={formula}" if formula else question.course.own_values.get(place)
+        if content is not None:
+            yield question.sheet, (row, column), content
 
 
 def column_of(letters):
@@ -140,15 +150,17 @@ def value_of(book, sheet, row, column):
     return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
 
-def verdict(found, wanted):
-    """right, wrong, or unclear: what these values are worth beside the key's."""
-    worst = 0.0
-    for world, key in zip(found, wanted, strict=True):
+def verdict(answer, found, wanted):
+    """right, wrong, or unclear: what these values are worth; where and how they differ most."""
+    worst, words = 0.0, ""
+    for n, (world, key) in enumerate(zip(found, wanted, strict=True)):
         numbers = [abs(v) for v in key if isinstance(v, float)]
         scale = math.sqrt(sum(v * v for v in numbers) / len(numbers)) if numbers else 0.0
-        for a, b in zip(world, key, strict=True):
-            worst = max(worst, distance(a, b, scale))
-    return "right" if worst <= SAME else "wrong" if worst > OTHER else "unclear"
+        for line, a, b in zip(answer.rows, world, key, strict=True):
+            if (far := distance(a, b, scale)) > worst:
+                place = f"run {n}, row {line.row}: {line.text} {line.helpers or ''}"
+                worst, words = far, f"{place} shows {a!r}, the key {b!r}"
+    return "right" if worst <= SAME else "wrong" if worst > OTHER else "unclear", words
 
 
 def distance(a, b, scale):

@@ -29,6 +29,11 @@ class Question:
         self.keys = {cell[1]: read(cell[3]) for cell in cells}
 
     @cached_property
+    def copied(self):
+        """Rows of the column: those that are asked for, and those that are given above them."""
+        return {*self.rows} if self.is_scalar else {*range(FIRST_ROW, max(self.rows) + 1)}
+
+    @cached_property
     def steps(self):
         return [row - FIRST_ROW for row in self.rows]
 
@@ -58,6 +63,8 @@ class Line:
         formula = place and self.course.formulas.get(place)
         if not formula or place[0] == self.question.sheet and place[2] == self.question.column:
             return None
+        if any(f"{title}!" in formula.replace("'", "") for title in self.course.exercise.frozen):
+            return None  # a handout holds numbers there
         return read(qualified(formula, place[0]) if place[0] != self.question.sheet else formula)
 
     def place(self, text):
@@ -96,7 +103,7 @@ def moved(text, question, letter):
 
     def change(match):
         sheet = match[1][:-1].strip("'") if match[1] else question.sheet
-        if sheet != question.sheet or match[3] != own:
+        if sheet != question.sheet or match[3] != own or int(match[5]) not in question.copied:
             return match[0]
         return f"{match[1] or ''}{match[2]}{letter}{match[4]}{match[5]}"
 

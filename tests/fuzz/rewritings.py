@@ -3,7 +3,7 @@
 import re
 
 from fuzz.question import REFERENCE
-from fuzz.trees import binary, call, number, places, read, replaced, text_of
+from fuzz.trees import binary, call, is_number, number, places, read, replaced, text_of
 
 ONE, ZERO, TWO = ("number", 1.0), ("number", 0.0), ("number", 2.0)
 
@@ -123,7 +123,9 @@ def wrapped_number(line, part, counts):
         binary("-", binary("+", x, ONE), ONE),
         call("ROUND", x, ("number", 14.0)), call("SUMPRODUCT", binary("*", x, ONE)),
         ("unary", "%", binary("*", ("number", 100.0), x)), call("TRUNC", x, ("number", 14.0)),
-        call("IMREAL", x), binary("/", binary("*", x, ("number", 7.0)), ("number", 7.0)),
+        call("IMREAL", x), call("INDEX", call("CHOOSE", ("array", ("row", ONE, TWO)), x, ZERO), ONE)
+        if "IF" not in text_of(x) else binary("+", x, ZERO),
+        binary("/", binary("*", x, ("number", 7.0)), ("number", 7.0)),
         call("SUM", x, ("number", 5.0), ("unary", "-", ("number", 5.0))),
     ])  # fmt: skip
 
@@ -141,7 +143,6 @@ def wrapped(line, part, counts):
         call("SWITCH", ONE, ONE, x, ZERO), call("IF", call("NOT", ("truth", False)), x),
         call("IF", call("AND", ("truth", True), binary("=", TWO, TWO)), x, ("text", "")),
         call("IF", ONE, x, ("text", "?")), call("IFNA", x, ZERO),
-        call("INDEX", call("CHOOSE", ("array", ("row", ONE, TWO)), x, ZERO), ONE),
         call("IF", call("ISERROR", x), ZERO, x), call("IF", call("ISTEXT", x), ("text", ""), x),
     ])  # fmt: skip
 
@@ -299,12 +300,21 @@ def helped(line, part, counts):
     """A part in a helper cell, beside the table or on another sheet; or in a chain of them."""
     if part[0] in ("omitted", "number", "text", "truth") or len(line.helpers) > 3:
         return None
+    # A cell that points to an empty one holds 0 in Excel, and nothing in LibreOffice.
+    if not is_number(part) and any(line.course.may_be_empty(line.place(ref)) for ref in _refs(part)):
+        return None
     elsewhere = line.dice.random() < 0.4
     found = line.helper(part, elsewhere)
     for _ in range(line.dice.choice([0, 0, 0, 1, 2])):
         if len(line.helpers) < 4:
             found = line.helper(found, line.dice.random() < 0.4)
     return found
+
+
+def _refs(part):
+    for _, tree, _ in places(part):
+        if tree[0] in ("ref", "raw"):
+            yield from (m[0] for m in REFERENCE.finditer(tree[1]))
 
 
 def entered_as_array(line, part, counts):
