@@ -155,7 +155,7 @@ def referred(line, part, counts):
     cell = f"{letters}{row}"
     forms = [f"{sheet}${letters}{row}", f"{sheet}{letters}${row}", f"{sheet}${letters}${row}",
              f"INDEX({sheet}{cell},1)", f"INDEX({sheet}{cell},1,1)"]  # fmt: skip
-    if row > 3:
+    if row > 4:
         top = f"{sheet}{letters}${max(row - 2, 4)}:{letters}{row}"
         forms += [f"INDEX({top},ROWS({top}))", f"INDEX({top},COUNTA({top}))",
                   f"LOOKUP(2,1/($A${max(row - 2, 4)}:$A{row}=$A{row}),{top})"]  # fmt: skip
