@@ -11,8 +11,8 @@ from openpyxl.utils import column_index_from_string, get_column_letter
 
 from kfsheet.coursework.handout.handout_workbook import handout_bytes, own_run
 from kfsheet.coursework.handout.own_numbers import own_numbers
-from kfsheet.coursework.judging.answer_key import asked_steps
 from kfsheet.coursework.reading.roster import Student
+from kfsheet.model.exercise import asked_steps
 from kfsheet.model.expressions import Missing
 from kfsheet.workbook.write.layout import FIRST_ROW, Layout
 

@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from kfsheet.errors import EngineError
 
 # Asked for here, once: a class must not be half graded when the first plot is drawn.
-if missing := [name for name in ("gmpy2", "ironcalc", "matplotlib") if find_spec(name) is None]:
+if missing := [name for name in ("ironcalc", "matplotlib") if find_spec(name) is None]:
     raise EngineError(
         f'handouts and grading need {", ".join(missing)}: pip install "kfsheet[grading]"'
     )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from kfsheet.errors import ModelError
 from kfsheet.model.chart import Chart
+from kfsheet.model.expressions import Missing
 from kfsheet.model.recurrence import Recurrence
 
 if TYPE_CHECKING:
@@ -165,3 +166,15 @@ class Exercise:
     def title(self) -> str:
         """One line for people."""
         return self.model.title
+
+
+def asked_steps(model: Recurrence, name: str) -> list[int]:
+    """Steps in which an answer is asked for; a derived scalar has the one step 0.
+
+    A start that is a plain number is given: there is no formula to find.
+    """
+    if name in model.derived_scalars:
+        return [0]
+    column = model.column(name)
+    given = [rule is Missing or rule.is_Number for rule in column.start]
+    return [k for k in range(model.rows) if not (k < len(given) and given[k])]

@@ -1,22 +1,21 @@
 """The questions of an exercise as a notebook that nbgrader can hand out and grade.
 
 Each question is a function of the quantities that its column reads. Its tests compare it with the
-key at random points; most of them are hidden from the students.
+key in whole runs of the model; most of them are hidden from the students.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from math import nan
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from sympy import Basic, Dummy, Expr, Indexed, Symbol
 
-from kfsheet.coursework.judging.answer_key import ERROR, value_at
-from kfsheet.coursework.judging.precise_values import MISSING, cell_of
-from kfsheet.coursework.judging.random_samples import ALONE, Sample, Sampler
+from kfsheet.coursework.judging.calculated_answers import Value
+from kfsheet.coursework.judging.model_runs import ModelRuns, World
 from kfsheet.errors import ModelError
 from kfsheet.files import write_file
 from kfsheet.model.exercise import Exercise, Question
@@ -62,10 +61,11 @@ def assignment(exercise: Exercise, *, solved: bool) -> Any:
 
     if not exercise.questions:
         raise ModelError(f"{exercise.name} asks no questions; list them in Exercise(questions=...)")
+    runs = ModelRuns(exercise)
     cells = [
         v4.new_markdown_cell("\n\n".join([f"# {exercise.title}", *exercise.about])),
         v4.new_code_cell(START),
-        *(cell for question in exercise.questions for cell in _cells(exercise, question)),
+        *(cell for question in exercise.questions for cell in _cells(runs, question)),
     ]
     for number, cell in enumerate(cells, 1):
         cell.id = f"cell-{number:02d}"
@@ -79,10 +79,10 @@ def _blank(match: re.Match[str]) -> str:
     return f"{match[1]}# YOUR CODE HERE\n{match[1]}raise NotImplementedError()"
 
 
-def _cells(exercise: Exercise, question: Question) -> Iterator[Any]:
+def _cells(runs: ModelRuns, question: Question) -> Iterator[Any]:
     from nbformat import v4
 
-    model, name = exercise.model, question.name
+    model, name = runs.model, question.name
     scalar = model.derived_scalars.get(name)
     item = scalar or model.column(name)
     key, names = _with_arguments(item.expression)
@@ -91,7 +91,7 @@ def _cells(exercise: Exercise, question: Question) -> Iterator[Any]:
     head = f"def {name}({', '.join(names.values())}):"
     body = f"    {BEGIN}\n    return {python_code(key)}\n    {END}"
     yield v4.new_code_cell(f"{head}\n{body}", metadata=_metadata(f"{name}-answer", solution=True))
-    tests = list(_tests(exercise, name, item.expression, names))
+    tests = list(_tests(runs, name, names))
     hidden = ["### BEGIN HIDDEN TESTS", *tests[POINTS_SHOWN:], "### END HIDDEN TESTS"]
     text = "\n".join([*tests[:POINTS_SHOWN], *hidden])
     yield v4.new_code_cell(text, metadata=_metadata(f"{name}-test", points=question.points))
@@ -123,31 +123,22 @@ def _with_arguments(key: Expr) -> tuple[Expr, dict[Basic, str]]:
     return key.xreplace({node: Symbol(name, real=True) for node, name in names.items()}), names
 
 
-def _tests(exercise: Exercise, name: str, key: Expr, names: dict[Basic, str]) -> Iterator[str]:
-    sampler = Sampler(exercise.model)
-    row, number, count = exercise.model.rows // 2, 0, 0
-    while count < POINTS_SHOWN + POINTS_HIDDEN and number < 60:
-        sample = Sample(sampler, row, ALONE, number)
-        number += 1
-        wanted = value_at(key, sample)
-        if wanted is ERROR:
-            continue
-        count += 1
-        given = ", ".join(_number(_at(sample, node, row)) for node in names)
-        yield f"assert close({name}({given}), {_number(wanted)})"
+def _tests(runs: ModelRuns, name: str, names: dict[Basic, str]) -> Iterator[str]:
+    row, wanted = runs.model.rows // 2, POINTS_SHOWN + POINTS_HIDDEN
+    points = ((world, step) for step in (row, row + 1, row - 1) for world in runs.worlds)
+    for world, step in islice(points, wanted):
+        given = ", ".join(_number(_at(world, node, step)) for node in names)
+        yield f"assert close({name}({given}), {_number(world.cell(name, step))})"
 
 
-def _at(sample: Sample, node: Basic, row: int) -> Any:
+def _at(world: World, node: Basic, row: int) -> Value:
     if node == t:
-        return row
+        return float(row)
     if node.is_Symbol:
-        return sample(node.name, 0)
-    name, fixed, place = cell_of(node)
-    return sample(name, place if fixed else row - place)
+        return world.cell(node.name)
+    return world.cell(str(node.base.label), int(node.indices[0].subs(t, row)))
 
 
-def _number(value: Any) -> str:
+def _number(value: Value) -> str:
     """A value as source."""
-    missing = value is None or value is MISSING
-    number = nan if missing else float(value)
-    return "nan" if missing else repr(number)
+    return repr(value) if isinstance(value, float) else "nan"

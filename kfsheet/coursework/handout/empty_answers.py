@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from kfsheet.coursework.handout.questions_sheet import SHEET
-from kfsheet.coursework.judging.answer_key import asked_steps
-from kfsheet.model.exercise import Exercise
+from kfsheet.model.exercise import Exercise, asked_steps
 from kfsheet.workbook.write.layout import FIRST_ROW, WORDS_ROW, Layout
 from kfsheet.workbook.write.run import Run
 from kfsheet.workbook.write.sheet import Cell, Sheet

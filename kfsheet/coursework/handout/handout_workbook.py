@@ -14,7 +14,7 @@ from kfsheet.coursework.handout.empty_answers import with_empty_answers
 from kfsheet.coursework.handout.lock import lock
 from kfsheet.coursework.handout.own_numbers import own_numbers
 from kfsheet.coursework.handout.questions_sheet import question_pages
-from kfsheet.coursework.judging.random_samples import OwnNumbers
+from kfsheet.coursework.judging.model_runs import OwnNumbers
 from kfsheet.coursework.reading.roster import Student
 from kfsheet.model.exercise import Exercise
 from kfsheet.workbook.engines.recalculate import recalculate

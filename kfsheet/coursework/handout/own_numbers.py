@@ -7,7 +7,7 @@ from math import floor, isnan, log10
 from numpy.random import RandomState
 
 from kfsheet.coursework.handout import course_secret
-from kfsheet.coursework.judging.random_samples import OwnNumbers
+from kfsheet.coursework.judging.model_runs import OwnNumbers
 from kfsheet.errors import DataError, ModelError
 from kfsheet.evaluation.evaluate import run
 from kfsheet.model.exercise import Exercise

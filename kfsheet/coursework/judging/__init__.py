@@ -1,5 +1,5 @@
-"""What an answer is worth, and what kind of mistake is in it.
+"""What an answer is worth: its values, in several runs of the model, beside those of the key.
 
-Here belong the meaning of a cell, the points at which it is compared with the key, and the names of
-mistakes. Nothing here may write a file. Begin with :mod:`kfsheet.coursework.judging.judge`.
+Here belong the runs, the values of a student's cells in them, and what an answer must not need.
+Nothing here may write a file. Begin with :mod:`kfsheet.coursework.judging.judge`.
 """

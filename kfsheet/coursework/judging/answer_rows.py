@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Hashable
 from dataclasses import dataclass, field
 from itertools import pairwise
 
 from openpyxl.utils import get_column_letter
 
 from kfsheet.coursework.judging.calculated_answers import Outcome
-from kfsheet.coursework.judging.formula_meaning import parsed
-from kfsheet.coursework.reading.cell_addresses import CellAddresses
+from kfsheet.coursework.reading.cell_addresses import CellAddresses, find_sheet
+from kfsheet.coursework.reading.formula_text import parsed
 from kfsheet.coursework.reading.submission import Book
 from kfsheet.coursework.reading.worksheet import Content, Formula
 from kfsheet.errors import FormulaError
-from kfsheet.parsing.references import Address, Reference
+from kfsheet.parsing.references import Address, Cell, Reference
+
+DISTANCE = re.compile(r"\{[^{}]*\}")
 
 
 @dataclass(frozen=True)
@@ -41,8 +45,8 @@ def not_in(book: Book, rest: list[AnswerCell], right: list[AnswerCell]) -> str:
     if not isinstance(content, Formula) or not isinstance(content_of(book, right[-1]), Formula):
         return words
     try:
-        known = set(parsed(content_of(book, right[-1]))[1])
-        strange = [r for r in parsed(content)[1] if r not in known]
+        known = set(parsed(content_of(book, right[-1])).references)
+        strange = [r for r in parsed(content).references if r not in known]
     except FormulaError:
         return words
     names = ", ".join(dict.fromkeys(shown(r, first.address[1:]) for r in strange))
@@ -51,15 +55,43 @@ def not_in(book: Book, rest: list[AnswerCell], right: list[AnswerCell]) -> str:
 
 def fixed_row(book: Book, addresses: CellAddresses, cell: AnswerCell) -> str:
     """The cells of the tables to which a formula refers with a fixed row, such as D$5."""
+    content = content_of(book, cell)
+    if not isinstance(content, Formula):
+        return ""
     sheet, *host = cell.address
     found = []
-    for reference in parsed(content_of(book, cell))[1]:
-        if reference.first and reference.first.row_fixed:
+    for reference in parsed(content).references:
+        if reference.first and reference.first.row_fixed and not reference.last:
             _, column = reference.first.at(tuple(host))
-            place = (reference.sheet or sheet, reference.first.row, column)
+            place = (find_sheet(book, reference.sheet or sheet), reference.first.row, column)
             if isinstance(addresses.role(place), tuple):
                 found.append(shown(reference, tuple(host)))
-    return ", ".join(dict.fromkeys(found)) or "a fixed row"
+    return ", ".join(dict.fromkeys(found))
+
+
+def shape(book: Book, addresses: CellAddresses, cell: AnswerCell) -> Hashable:
+    """The same for formulas that differ only in how far they are from what they refer to."""
+    content = content_of(book, cell)
+    if not isinstance(content, Formula):
+        return cell.pattern
+    sheet, *host = cell.address
+    key, _, found = parsed(content)
+    return DISTANCE.sub("{}", key), tuple(
+        reference.name or _role(book, addresses, reference, sheet, tuple(host))
+        for reference in found
+    )
+
+
+def _role(
+    book: Book, addresses: CellAddresses, reference: Reference, sheet: str, host: Cell
+) -> Hashable:
+    """Which quantity of which row a reference reads, seen from its own row unless that is fixed."""
+    corner = reference.first
+    role = addresses.role((find_sheet(book, reference.sheet or sheet), *corner.at(host)))
+    if isinstance(role, tuple) and not corner.row_fixed:
+        own = addresses.role((sheet, *host))
+        return role[0], role[1] - (own[1] if isinstance(own, tuple) else 0)
+    return role or (corner.row, corner.column)
 
 
 def rows_of(cells: list[AnswerCell]) -> str:

@@ -8,22 +8,23 @@ other cells hold what they hold.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from kfsheet.coursework.judging.model_runs import ModelRuns, World
-from kfsheet.coursework.judging.random_samples import OwnNumbers
+from kfsheet.coursework.judging.model_runs import World
 from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.coursework.reading.submission import Book
-from kfsheet.parsing.calculator import Error, SheetCalculator, TooMuchWorkError
+from kfsheet.parsing.calculator import Error, Formula, SheetCalculator, TooMuchWorkError
 from kfsheet.parsing.references import Address, Cell
 
 TOLERANCE = 1e-9  # an answer that adds in another order rounds in another way
 SMALL = 1e-4  # of a column's root mean square: differences of large numbers are small and rough
 WORK = 200_000  # operations of one formula
 SECONDS = 2.0  # of one answer, all rows and worlds together
+KEPT = 4  # workbooks whose cells a world keeps: those of moved rows are few
 Value = float | str | bool | Error | None
 Cells = dict[str, dict[Cell, Value]]
+Chosen = Callable[[str, int], bool]
 
 
 class Outcome(NamedTuple):
@@ -36,15 +37,12 @@ class Outcome(NamedTuple):
 
 
 class CalculatedAnswers:
-    """The answers of one workbook."""
+    """The answers of one workbook; the first of the worlds is that of the student's own numbers."""
 
-    def __init__(
-        self, book: Book, addresses: CellAddresses, runs: ModelRuns, own: OwnNumbers
-    ) -> None:
-        self._addresses, self._model = addresses, runs.model
+    def __init__(self, book: Book, addresses: CellAddresses, worlds: Sequence[World]) -> None:
+        self.worlds = worlds
+        self._addresses, self._own = addresses, worlds[0]
         self._base = SheetCalculator(book.sheets, {**book.names, **book.sheet_names}, work=WORK)
-        self._own = runs.own_worlds(own)
-        self.worlds = (*self._own, *runs.worlds)
         self._sheets: dict[World, SheetCalculator] = {}
         self._places = _places(addresses)
         self.deadline = float("inf")
@@ -53,9 +51,9 @@ class CalculatedAnswers:
         """Whether a formula fills a cell, be it one of an array."""
         return self._base.is_formula(address)
 
-    def kind(self, address: Address) -> type:
-        """What the key gives in a cell with the student's own numbers: a number, or a text."""
-        return type(self._sheet(self._own[0]).value(address))
+    def kind(self, name: str, step: int) -> type:
+        """What the key gives in a row with the student's own numbers: a number, or a text."""
+        return type(self._own.cell(name, step))
 
     def begin(self) -> None:
         """A new answer, with time of its own."""
@@ -71,39 +69,78 @@ class CalculatedAnswers:
         """
         if time.process_time() > self.deadline:
             raise TooMuchWorkError("calculating it takes too long")
-        return [self._outcome(world, name, step, address) for world in self.worlds]
+        return [self.outcome(world, name, step, address) for world in self.worlds]
 
-    def _outcome(self, world: World, name: str, step: int, address: Address) -> Outcome:
-        wanted = self._sheet(world).value(address)
-        found = self._sheet(world).formula_value(address)
-        size = world.sizes.get(name, 0.0)
-        return Outcome(found, wanted, same(found, wanted, size), world)
+    def outcome(
+        self, world: World, name: str, step: int, address: Address, formula: Formula | None = None
+    ) -> Outcome:
+        """What the formula of one row, or another one in its place, gives in one world."""
+        wanted = world.cell(name, step)
+        found = self._sheet(world).formula_value(address, formula)
+        return Outcome(found, wanted, same(found, wanted, world.sizes.get(name, 0.0)), world)
 
-    def reads(self, cells: Iterable[tuple[str, int]], address: Address) -> bool:
-        """Whether the formula in a cell needs one of the cells of the model."""
-        world = self._own[0]
-        spoilt: Cells = {sheet: dict(found) for sheet, found in self._cells(world).items()}
-        for name, step in cells:
-            if place := self._addresses.of(name, step):
-                spoilt[place[0]][place[1:]] = Error.CIRC
-        return self._base.with_values(spoilt).formula_value(address) is Error.CIRC
+    def needs(self, chosen: Chosen, address: Address) -> bool:
+        """Whether a formula gives something else if the cells that are chosen are errors.
 
-    def works(self, name: str, address: Address) -> bool:
+        An error that is swallowed, by ISNUMBER say, shows as well as one that comes through.
+        """
+        cells = self._cells(self._own)
+        spoilt = {name: _Spoilt(self._addresses, name, chosen, cells[name]) for name in cells}
+        found = self._base.with_values(spoilt).formula_value(address)
+        return not same(found, self._sheet(self._own).formula_value(address))
+
+    def works(self, name: str, step: int, address: Address) -> bool:
         """Whether a cell, calculated in the student's own file, has the key's value."""
-        wanted = self._sheet(self._own[0]).value(address)
-        return same(self._base.value(address), wanted, self._own[0].sizes.get(name, 0.0))
+        wanted, size = self._own.cell(name, step), self._own.sizes.get(name, 0.0)
+        return same(self._base.value(address), wanted, size)
 
     def _sheet(self, world: World) -> SheetCalculator:
         if world not in self._sheets:
             self._sheets[world] = self._base.with_values(self._cells(world))
         return self._sheets[world]
 
-    def _cells(self, world: World) -> Cells:
+    def _cells(self, world: World) -> Mapping[str, Mapping[Cell, Value]]:
         if self._places not in world.known:
-            if len(world.known) > 3:  # files whose rows were moved are few
-                world.known.clear()
-            world.known[self._places] = filled(world, self._addresses)
+            while len(world.known) >= KEPT:
+                del world.known[next(iter(world.known))]
+            sheets = {address[0] for address in self._addresses.scalars} | {*self._addresses.tables}
+            world.known[self._places] = {
+                sheet: _WorldCells(self._addresses, sheet, world) for sheet in sheets
+            }
         return world.known[self._places]
+
+
+class _WorldCells(dict[Cell, Value]):
+    """The cells of the model on one worksheet, as a world has them, made when asked for."""
+
+    def __init__(self, addresses: CellAddresses, sheet: str, world: World) -> None:
+        super().__init__()
+        self._addresses, self._sheet, self._world = addresses, sheet, world
+
+    def __missing__(self, cell: Cell) -> Value:
+        role = self._addresses.role((self._sheet, *cell))
+        if role is None:
+            raise KeyError(cell)
+        self[cell] = self._world.cell(role) if isinstance(role, str) else self._world.cell(*role)
+        return self[cell]
+
+
+class _Spoilt(dict[Cell, Value]):
+    """The same with errors in the cells that are chosen, to see who needs them."""
+
+    def __init__(
+        self, addresses: CellAddresses, sheet: str, chosen: Chosen, cells: Mapping[Cell, Value]
+    ) -> None:
+        super().__init__()
+        self._addresses, self._sheet = addresses, sheet
+        self._chosen, self._others = chosen, cells
+
+    def __missing__(self, cell: Cell) -> Value:
+        role = self._addresses.role((self._sheet, *cell))
+        if role is None:
+            raise KeyError(cell)
+        name, step = (role, 0) if isinstance(role, str) else role
+        return Error.CIRC if self._chosen(name, step) else self._others[cell]
 
 
 def _places(addresses: CellAddresses) -> tuple:
@@ -123,11 +160,9 @@ def filled(world: World, addresses: CellAddresses) -> Cells:
         filled = cells.setdefault(sheet, {})
         for table in reversed(tables):
             for column, name in table.columns.items():
-                values = world.cells(name)
-                filled.update({(r, column): values[step] for r, step in table.steps.items()})
+                filled.update({(r, column): world.cell(name, k) for r, k in table.steps.items()})
     for (sheet, *place), name in addresses.scalars.items():
-        value = float(world.scalars[name])
-        cells.setdefault(sheet, {})[tuple(place)] = value if value == value else ""
+        cells.setdefault(sheet, {})[tuple(place)] = world.cell(name)
     return cells
 
 

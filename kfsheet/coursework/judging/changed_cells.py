@@ -3,37 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import lru_cache
 from math import isclose, isnan
-from typing import NamedTuple
 
-from openpyxl.utils import get_column_letter
-
-from kfsheet.coursework.judging.answer_key import asked_steps
-from kfsheet.coursework.judging.formula_meaning import Interpreter, Meaning
-from kfsheet.coursework.judging.random_samples import OwnNumbers
+from kfsheet.coursework.judging.calculated_answers import CalculatedAnswers
+from kfsheet.coursework.judging.model_runs import OwnNumbers
+from kfsheet.coursework.judging.original_workbook import original_workbook
 from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.coursework.reading.submission import Book
 from kfsheet.coursework.reading.worksheet import Content, Formula
-from kfsheet.errors import FormulaError
-from kfsheet.model.exercise import Exercise
+from kfsheet.errors import KfsheetError
+from kfsheet.model.exercise import Exercise, asked_steps
+from kfsheet.model.expressions import columns_read
 from kfsheet.parsing.references import Address, relative_key
-from kfsheet.workbook.write.exercise_sheets import section_sheet
-from kfsheet.workbook.write.layout import Layout
-from kfsheet.workbook.write.run import Run
-from kfsheet.workbook.write.sheet import Cell, is_formula
 
+WORLDS_CHECKED = 3  # with the student's own numbers, with and without observations
 ROWS_CHECKED = 40  # rows of a long table that are looked at
 
 
 def changed_cells(
-    exercise: Exercise, book: Book, addresses: CellAddresses, own: OwnNumbers
+    exercise: Exercise,
+    book: Book,
+    addresses: CellAddresses,
+    own: OwnNumbers,
+    calculated: CalculatedAnswers,
 ) -> list[str]:
     """Names of parameters, data and given columns that differ from what was handed out."""
     return [
         *_parameters(book, addresses, own),
         *_data(exercise, book, addresses, own),
-        *_formulas(exercise, book, addresses),
+        *_formulas(exercise, book, addresses, calculated),
     ]
 
 
@@ -62,28 +60,43 @@ def _data(
             yield name
 
 
-def _formulas(exercise: Exercise, book: Book, addresses: CellAddresses) -> Iterator[str]:
+def _formulas(
+    exercise: Exercise, book: Book, addresses: CellAddresses, calculated: CalculatedAnswers
+) -> Iterator[str]:
     asked = {q.name for q in exercise.questions}
-    interpreter = Interpreter(book, addresses)
-    original = _original(exercise)
+    original = original_workbook(exercise.model)
     unmoved = original.addresses.tables == addresses.tables
     unmoved &= original.addresses.scalars == addresses.scalars
     for column in exercise.model.table.values():
         if column.is_data or column.name in asked or column.section in exercise.frozen:
             continue
+        frozen = any(
+            exercise.model.table[name].section in exercise.frozen
+            for rule in column.rules
+            for name in columns_read(rule)
+            if name in exercise.model.table
+        )
+        if frozen and not unmoved:
+            continue  # it follows from numbers of the handout, which no world has
         steps = asked_steps(exercise.model, column.name)
         for step in steps[:: max(1, len(steps) // ROWS_CHECKED)]:
             found = addresses.of(column.name, step)
-            if unmoved and _same_text(_content(book, found), _content(original.book, found)):
-                continue  # what it means needs no look
-            wanted = _given(exercise.name, column.name, step)
-            try:
-                same = found and interpreter.meaning(found, step) == wanted
-            except FormulaError:
-                same = False
-            if not same:
+            given = original.addresses.of(column.name, step)
+            if unmoved and _same_text(_content(book, found), _content(original.book, given)):
+                continue  # what it gives needs no look
+            if frozen or not _right(calculated, column.name, step, found):
                 yield column.name
                 break
+
+
+def _right(calculated: CalculatedAnswers, name: str, step: int, address: Address | None) -> bool:
+    if address is None or not calculated.is_formula(address):
+        return False
+    try:
+        worlds = calculated.worlds[:WORLDS_CHECKED]
+        return all(calculated.outcome(w, name, step, address).right for w in worlds)
+    except KfsheetError:
+        return False
 
 
 def _same_text(found: Content | None, given: Content | None) -> bool:
@@ -91,49 +104,3 @@ def _same_text(found: Content | None, given: Content | None) -> bool:
     if not (isinstance(found, Formula) and isinstance(given, Formula)) or found.area:
         return False
     return found == given or relative_key(*found[:2]) == relative_key(*given[:2])
-
-
-@lru_cache(maxsize=50_000)
-def _given(exercise: str, column: str, step: int) -> Meaning | None:
-    """What a cell meant when it was handed out."""
-    original = _originals[exercise]
-    return original.interpreter.meaning(original.addresses.of(column, step), step)
-
-
-class _Original(NamedTuple):
-    """The tables as they are handed out, to be read like those that come back."""
-
-    book: Book
-    addresses: CellAddresses
-    interpreter: Interpreter
-
-
-_originals: dict[str, _Original] = {}
-
-
-def _original(exercise: Exercise) -> _Original:
-    if exercise.name not in _originals:
-        layout = Layout.standard(exercise.model)
-        book = Book("")
-        now = Run.of(exercise.model)
-        for page in (section_sheet(layout, section, now) for section in exercise.model.sections):
-            book.sheets[page.title] = {
-                cell: Formula(piece.content, cell) if is_formula(piece.content) else _plain(piece)
-                for cell, piece in page.all_cells()
-                if piece.content is not None
-            }
-        book.sheets["Parameters"] = {}
-        book.names = {n.lower(): _reference(address) for n, address in layout.scalars.items()}
-        addresses = CellAddresses.find(book, exercise.model)
-        _originals[exercise.name] = _Original(book, addresses, Interpreter(book, addresses))
-    return _originals[exercise.name]
-
-
-def _reference(address: Address) -> str:
-    sheet, row, column = address
-    return f"{sheet}!${get_column_letter(column)}${row}"
-
-
-def _plain(piece: Cell) -> Content:
-    content = piece.content
-    return float(content) if isinstance(content, int | float) else str(content)

@@ -1,26 +1,26 @@
 """Marks: what each answer of a workbook is worth, and what kind of mistake is in it.
 
 Every row's own formula is calculated in its own row, in several runs of the model and with the
-student's own numbers; it is right if it gives the key's value in all of them and needs nothing that
-follows from it. A formula that we cannot calculate is handed to ``recalculated``, which asks a
-spreadsheet engine. What is wrong gets a name from :mod:`kfsheet.coursework.judging.diagnosis`.
+student's own numbers; it is right if it gives the key's value in all of them and needs nothing
+that follows from it. A formula that we cannot calculate is handed to ``recalculated``, which asks a
+spreadsheet engine. What is wrong gets a name in :mod:`kfsheet.coursework.judging.mistakes`.
 """
 
 from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import inf
 
 from openpyxl.utils import FORMULAE
 
-from kfsheet.coursework.judging.answer_key import asked_steps
-from kfsheet.coursework.judging.answer_rows import AnswerCell, content_of, not_in, rows_of
-from kfsheet.coursework.judging.calculated_answers import CalculatedAnswers
-from kfsheet.coursework.judging.circular_references import circular_reference
-from kfsheet.coursework.judging.diagnosis import (
+from kfsheet.coursework.judging.answer_rows import AnswerCell, content_of, not_in, rows_of, shape
+from kfsheet.coursework.judging.calculated_answers import SECONDS, CalculatedAnswers
+from kfsheet.coursework.judging.dependencies import ancestors, delays
+from kfsheet.coursework.judging.mistakes.diagnosis import (
     EMPTY,
     GAPS,
     GONE,
@@ -36,15 +36,16 @@ from kfsheet.coursework.judging.diagnosis import (
     Diagnosis,
     digest_of,
 )
-from kfsheet.coursework.judging.formula_meaning import Interpreter, forbidden
-from kfsheet.coursework.judging.model_runs import ModelRuns
-from kfsheet.coursework.judging.random_samples import OwnNumbers, Sampler
+from kfsheet.coursework.judging.mistakes.known_mistakes import KnownMistakes
+from kfsheet.coursework.judging.model_runs import ModelRuns, OwnNumbers
+from kfsheet.coursework.judging.precedents import circle_in_words, forbidden_precedent
 from kfsheet.coursework.reading.cell_addresses import CellAddresses
+from kfsheet.coursework.reading.formula_text import forbidden
 from kfsheet.coursework.reading.submission import Book
 from kfsheet.coursework.reading.worksheet import Formula
+from kfsheet.coursework.time_limit import OutOfTimeError, time_limit
 from kfsheet.errors import ForbiddenError, KfsheetError
-from kfsheet.model.exercise import Question
-from kfsheet.model.expressions import columns_read
+from kfsheet.model.exercise import Question, asked_steps
 from kfsheet.parsing.calculator import TooMuchWorkError
 from kfsheet.parsing.references import relative_key
 
@@ -80,17 +81,17 @@ class Judge:
     def __init__(
         self,
         runs: ModelRuns,
-        sampler: Sampler,
+        mistakes: KnownMistakes,
         book: Book,
         own: OwnNumbers,
         recalculated: Recalculated,
     ) -> None:
-        self._exercise, self._model, self._sampler = runs.exercise, runs.model, sampler
+        self._exercise, self._model = runs.exercise, runs.model
         self.book, self._recalculated = book, recalculated
         self.addresses = CellAddresses.find(book, runs.model)
-        self._calculated = CalculatedAnswers(book, self.addresses, runs, own)
-        self._interpreter = Interpreter(book, self.addresses)
-        self._diagnosis = Diagnosis(book, self.addresses, self._interpreter, sampler, own)
+        worlds = (*runs.own_worlds(own), *runs.worlds)
+        self.calculated = CalculatedAnswers(book, self.addresses, worlds)
+        self._diagnosis = Diagnosis(book, self.addresses, self.calculated, runs, mistakes, own)
 
     def marks(self) -> list[Mark]:
         """One mark for each question."""
@@ -101,7 +102,7 @@ class Judge:
         if any(cell is None for cell in cells):
             words = "the table or the label of this answer is gone; hand in a file that has it"
             return Mark(asked.name, asked.points, 0.0, GONE, words)
-        self._calculated.begin()
+        self.calculated.begin()
         judged = {c.step: c for group in _alike(cells) for c in self._judged(asked.name, group)}
         cells = [judged.get(cell.step, cell) for cell in cells]
         # An engine calculates the whole workbook several times over: only where nothing else can.
@@ -123,7 +124,7 @@ class Judge:
             pattern = f"{rule}: {relative_key(content.text, content.host)}"
             # An array formula stands in one cell and fills others: each is judged by itself.
             return AnswerCell(step, address, FORMULA, "", pattern)
-        if self._calculated.is_formula(address):
+        if self.calculated.is_formula(address):
             return AnswerCell(step, address, FORMULA, "", f"{self._rule(name, step)}: array")
         if content is None or content == "":
             return AnswerCell(step, address, EMPTY)
@@ -159,7 +160,7 @@ class Judge:
     def _looked_at(self, name: str, group: list[AnswerCell]) -> list[AnswerCell]:
         if len(group) <= FEW:
             return group
-        kinds = [self._calculated.kind(cell.address) for cell in group]
+        kinds = [self.calculated.kind(name, cell.step) for cell in group]
         at = {0, 1, 2, 3, len(group) - 2, len(group) - 1}
         at |= set(range(0, len(group), len(group) // 12))
         changes = [n for n, (a, b) in enumerate(pairwise(kinds)) if a != b][:6]
@@ -168,7 +169,10 @@ class Judge:
 
     def _calculate(self, name: str, cell: AnswerCell) -> AnswerCell:
         try:
-            outcomes = tuple(self._calculated.outcomes(name, cell.step, cell.address))
+            with time_limit(SECONDS):
+                outcomes = tuple(self.calculated.outcomes(name, cell.step, cell.address))
+        except OutOfTimeError:
+            return replace(cell, status=UNREADABLE, words=f"{GIVEN_UP}calculating takes too long")
         except ForbiddenError as error:
             return replace(cell, status=REFUSED, words=str(error))
         except TooMuchWorkError as error:
@@ -183,13 +187,8 @@ class Judge:
 
     def _reaches_out(self, cell: AnswerCell) -> str:
         """Words, if a helper cell of a formula holds what no answer may use."""
-        try:
-            self._interpreter.meaning(cell.address, cell.step)
-        except ForbiddenError as error:
-            return str(error)
-        except Exception:  # whatever else is wrong with it has been said
-            return ""
-        return ""
+        words = forbidden_precedent(self.book, self.addresses, cell.address)
+        return f"{words} is not allowed" if words else ""
 
     def _not_its_own(self, name: str, right: list[AnswerCell]) -> str:
         """Words, if an answer with the right values is computed from itself, or copied."""
@@ -202,56 +201,29 @@ class Judge:
             return ""
 
     def _circle(self, name: str, cell: AnswerCell) -> str:
-        if not self._calculated.reads(self._consequences(name, cell.step), cell.address):
+        after = delays(self._model, name)
+
+        def follows(other: str, step: int) -> bool:
+            return step - cell.step >= after.get(other, inf)
+
+        if not self.calculated.needs(follows, cell.address):
             return ""
         # Who reads the analysis for the innovation may have written the analysis without it.
-        if self._calculated.works(name, cell.address):
+        if self.calculated.works(name, cell.step, cell.address):
             return ""
-        return self._circle_in_words(name, cell) or "it goes in a circle: it needs its own result"
-
-    def _consequences(self, name: str, step: int) -> list[tuple[str, int]]:
-        """The cells that follow from an answer in a row, itself included."""
-        if name in self._model.derived_scalars:
-            found = self._sampler.consequences(name)
-            scalars = [(n, 0) for n in found if n in self._model.derived_scalars]
-            return scalars + [
-                (n, k) for n in found if n in self._model.table for k in range(self._model.rows)
-            ]
-        later = min(step + 3, self._model.rows)
-        own_row = [(n, step) for n in self._sampler.consequences(name)]
-        return own_row + [
-            (n, k) for n in self._sampler.consequences(name) for k in range(step + 1, later)
-        ]
-
-    def _circle_in_words(self, name: str, cell: AnswerCell) -> str:
-        circle = circular_reference(self.book, self.addresses, name, cell.step)
-        if len(circle) == 2:
-            return "the formula refers to its own cell"
-        return f"it goes in a circle: {' -> '.join(circle)}" if circle else ""
+        return (
+            circle_in_words(self.book, cell.address)
+            or "it goes in a circle: it needs its own result"
+        )
 
     def _repeats(self, name: str, cell: AnswerCell) -> str:
         """Words, if the answer is copied from a column that hides its formula."""
-        given = [
-            v for v in self._exercise.veiled
-            if v in self._model.table and v not in self._ancestors(name)
-        ]  # fmt: skip
-        if not given or not self._calculated.reads(_rows(given, self._model.rows), cell.address):
-            return ""
-        for column in given:
-            if self._calculated.reads(_rows([column], self._model.rows), cell.address):
-                return f"{column} repeats the answer; derive it"
+        for veiled in self._exercise.veiled:
+            if veiled in ancestors(self._model, name):
+                continue
+            if self.calculated.needs(lambda other, _, v=veiled: other == v, cell.address):
+                return f"{veiled} repeats the answer; derive it"
         return ""
-
-    def _ancestors(self, name: str) -> set[str]:
-        """The columns from which an answer follows: they may be read, or written out."""
-        found: set[str] = set()
-        waiting = [name]
-        while waiting:
-            quantity = self._model.table.get(waiting.pop()) or self._model.derived_scalars.get(name)
-            more = {c for rule in quantity.rules for c in columns_read(rule)} - found
-            found |= more
-            waiting += [c for c in more if c in self._model.table]
-        return found
 
     # -- from cells to a mark --------------------------------------------------------------
 
@@ -281,10 +253,10 @@ class Judge:
             groups.setdefault(key, []).append(cell)
         return max(groups.items(), key=lambda group: (len(group[1]), group[0][-1]))[1]
 
-    def _shape(self, cell: AnswerCell) -> tuple | str:
+    def _shape(self, cell: AnswerCell) -> Hashable:
         try:
-            return self._interpreter.shape(cell.address, cell.step) if cell.pattern else ""
-        except Exception:  # what cannot be read as mathematics may be filled down all the same
+            return shape(self.book, self.addresses, cell) if cell.pattern else ""
+        except KfsheetError:  # what cannot be read may be filled down all the same
             return cell.pattern
 
     def _diagnosed(
@@ -300,10 +272,7 @@ class Judge:
             return TYPED, "another number stands in every row; it moves with no parameter", ""
         if culprit.words:
             return WRONG, culprit.words, ""
-        status, words, fingerprint = self._diagnosis.of(name, group, len(rest) > 1)
-        if status == WRONG and (words == PLAIN_WORDS[WRONG] or "recalculated" in words):
-            words = self._circle_in_words(name, culprit) or words
-        return status, words, fingerprint
+        return self._diagnosis.of(name, group, len(rest) > 1)
 
     def _typed_fingerprint(self, name: str, group: list[AnswerCell]) -> str:
         """Equal numbers in the files of two students, whose data differ, were not computed."""
@@ -319,10 +288,6 @@ def _only_gaps(cells: list[AnswerCell]) -> bool:
     wrong = [o for cell in cells for o in cell.outcomes if not o.right]
     filled = not re.search(r"\{\d+\$", cells[0].pattern)  # D$5 is another formula in each row
     return filled and bool(wrong) and all(o.world.gaps for o in wrong)
-
-
-def _rows(names: list[str], rows: int) -> Iterator[tuple[str, int]]:
-    return ((name, step) for name in names for step in range(rows))
 
 
 def _alike(cells: list[AnswerCell]) -> list[list[AnswerCell]]:

@@ -12,17 +12,17 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.random import RandomState
 
-from kfsheet.coursework.judging.random_samples import OwnNumbers
-from kfsheet.errors import DataError
+from kfsheet.errors import DataError, KfsheetError
 from kfsheet.model.exercise import Exercise
-from kfsheet.model.expressions import columns_read
+from kfsheet.model.expressions import Missing, columns_read
 from kfsheet.model.quantities import Column
 from kfsheet.parsing.calculator import EMPTY
 from kfsheet.workbook.write.run import Run
@@ -39,27 +39,39 @@ LARGEST = 1e8  # times the model's own values: beyond, a run says nothing
 Values = Mapping[str, Sequence[float]]
 
 
+@dataclass(frozen=True)
+class OwnNumbers:
+    """A student's own parameters and data."""
+
+    parameters: tuple[tuple[str, float], ...] = ()
+    data: tuple[tuple[str, tuple[float, ...]], ...] = ()
+
+
 @dataclass(frozen=True, eq=False)
 class World:
     """One run, and what is special in it."""
 
     columns: Mapping[str, Sequence[float]]
     scalars: Mapping[str, float]
-    data: frozenset[str]
+    empty: Mapping[str, Container[int]]
+    """Rows of a column that hold nothing where there is no value: those of data, and a start that
+    has none. In other rows a formula stands, which gives an empty text."""
     gaps: bool = False
     """Whether observations are missing."""
     own: bool = False
     """Whether parameters are the student's own."""
     own_data: bool = False
-    known: dict[tuple, dict] = field(default_factory=dict, repr=False)
+    known: dict[Hashable, Any] = field(default_factory=dict, repr=False)
     """The cells of a workbook in this world, by where they stand."""
 
-    def cells(self, name: str) -> list[float | str | None]:
-        """What the cells of a column hold: EMPTY without a datum, "" without a value."""
+    def cell(self, name: str, step: int = 0) -> float | str | None:
+        """What a cell of a column or scalar holds: EMPTY without a datum, "" without a value."""
         if name == "t":
-            return [float(n) for n in range(len(next(iter(self.columns.values()))))]
-        gap = EMPTY if name in self.data else ""
-        return [gap if math.isnan(v) else float(v) for v in self.columns[name]]
+            return float(step)
+        value = self.scalars[name] if name in self.scalars else self.columns[name][step]
+        if math.isnan(value):
+            return EMPTY if step in self.empty.get(name, ()) else ""
+        return float(value)
 
     @cached_property
     def sizes(self) -> dict[str, float]:
@@ -104,10 +116,27 @@ class ModelRuns:
             found.append(self._world(run, values, True, own_data))
         return tuple(found)
 
+    def own_world(self, own: OwnNumbers, changed: Mapping[str, float]) -> World | None:
+        """A student's own numbers with some parameters changed; None if nothing comes of them."""
+        data = {n: list(v) for n, v in own.data}
+        try:
+            run = Run.of(self.model, data, {**dict(own.parameters), **changed})
+        except KfsheetError:
+            return None
+        return self._world(run, data, True, True)
+
     def _world(self, run: Run, data: Values, own: bool = False, own_data: bool = False) -> World:
         gaps = any(math.isnan(v) for c in self._observed for v in data[c.name])
         columns = {**run.columns, **self._frozen}
-        return World(columns, run.scalars, self._names, gaps, own, own_data)
+        return World(columns, run.scalars, self._empty, gaps, own, own_data)
+
+    @cached_property
+    def _empty(self) -> dict[str, Container[int]]:
+        found: dict[str, Container[int]] = {name: range(self.model.rows) for name in self._names}
+        for column in self.model.all_columns():
+            if hollow := {k for k, rule in enumerate(column.start) if rule is Missing}:
+                found[column.name] = hollow
+        return found
 
     @cached_property
     def _frozen(self) -> dict[str, Sequence[float]]:

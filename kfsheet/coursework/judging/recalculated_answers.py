@@ -12,12 +12,12 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from kfsheet.coursework.judging.answer_key import asked_steps
 from kfsheet.coursework.judging.calculated_answers import Cells, filled, same
 from kfsheet.coursework.judging.model_runs import ModelRuns, World
 from kfsheet.coursework.judging.recalculation_process import calculated
 from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.errors import KfsheetError
+from kfsheet.model.exercise import asked_steps
 from kfsheet.parsing.references import Address
 from kfsheet.workbook.engines.libreoffice import libreoffice
 from kfsheet.workbook.engines.spreadsheet_engine import CellValue, Changes

@@ -4,8 +4,9 @@
 file       :mod:`kfsheet.coursework.reading.submission` reads it within limits
 cells      :mod:`kfsheet.coursework.reading.worksheet` keeps formulas, numbers and texts
 answers    :mod:`kfsheet.coursework.reading.cell_addresses` finds where they stand
-meaning    :mod:`kfsheet.coursework.judging.formula_meaning` makes each a SymPy expression
-mark       :mod:`kfsheet.coursework.judging.judge` compares it with the key, and names the mistake
+values     :mod:`kfsheet.coursework.judging.calculated_answers` calculates each in several worlds
+mark       :mod:`kfsheet.coursework.judging.judge` compares them with the key's
+mistake    :mod:`kfsheet.coursework.judging.mistakes.diagnosis` names it
 report     :mod:`kfsheet.coursework.reports.marked_workbook` writes the marks beside the answers
 =========  =====================================================================================
 
@@ -24,10 +25,10 @@ from kfsheet.coursework.handout import course_secret
 from kfsheet.coursework.handout.lock import TOKEN_PROPERTY
 from kfsheet.coursework.handout.own_numbers import own_numbers
 from kfsheet.coursework.judging.changed_cells import changed_cells
-from kfsheet.coursework.judging.diagnosis import EMPTY
 from kfsheet.coursework.judging.judge import Judge, Mark
-from kfsheet.coursework.judging.model_runs import ModelRuns
-from kfsheet.coursework.judging.random_samples import OwnNumbers, Sampler
+from kfsheet.coursework.judging.mistakes.diagnosis import EMPTY
+from kfsheet.coursework.judging.mistakes.known_mistakes import KnownMistakes
+from kfsheet.coursework.judging.model_runs import ModelRuns, OwnNumbers
 from kfsheet.coursework.judging.recalculated_answers import Recalculation
 from kfsheet.coursework.reading.cell_addresses import named_cell
 from kfsheet.coursework.reading.submission import Book, read_submission
@@ -71,10 +72,10 @@ class Assessment:
 
 
 @lru_cache(maxsize=4)
-def prepared(spec: str) -> tuple[ModelRuns, Sampler]:
-    """An exercise with its worlds and its random points, made once in a process."""
-    exercise = load_exercise(spec)
-    return ModelRuns(exercise), Sampler(exercise.model)
+def prepared(spec: str) -> tuple[ModelRuns, KnownMistakes]:
+    """An exercise with its worlds and its mistakes, made once in a process."""
+    runs = ModelRuns(load_exercise(spec))
+    return runs, KnownMistakes(runs)
 
 
 def assess(spec: str, secret: bytes, path: Path, copy: Path | None = None) -> Assessment:
@@ -91,14 +92,14 @@ def assess(spec: str, secret: bytes, path: Path, copy: Path | None = None) -> As
     copy : Path, optional
         Where the marked copy of the workbook goes.
     """
-    runs, sampler = prepared(spec)
+    runs, mistakes = prepared(spec)
     exercise = runs.exercise
     try:
         book = read_submission(path)
         student = _student(book, exercise, secret)
         own = own_numbers(exercise, secret, student)
         recalculation = Recalculation(path, runs)
-        judge = Judge(runs, sampler, book, own, recalculation)
+        judge = Judge(runs, mistakes, book, own, recalculation)
         marks = judge.marks()
         if all(mark.status == EMPTY for mark in marks):
             return Assessment(UNTOUCHED, "no answer was filled in", student, marks)
@@ -136,7 +137,7 @@ def _student(book: Book, exercise: Exercise, secret: bytes) -> str:
 def _remarks(exercise: Exercise, judge: Judge, own: OwnNumbers, late: bool) -> Iterator[str]:
     """What a lecturer should know of the file; no mark depends on it."""
     yield from judge.book.remarks
-    if changed := changed_cells(exercise, judge.book, judge.addresses, own):
+    if changed := changed_cells(exercise, judge.book, judge.addresses, own, judge.calculated):
         yield f"locked cells were changed ({', '.join(changed[:6])}); marks ignore that"
     if late:
         yield "there was no time to calculate all answers; grade again to try once more"

@@ -12,8 +12,8 @@ import matplotlib
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from kfsheet.coursework.judging.diagnosis import RIGHT
 from kfsheet.coursework.judging.judge import CREDIT, Mark
+from kfsheet.coursework.judging.mistakes.diagnosis import RIGHT
 from kfsheet.coursework.reports.grading import Result
 from kfsheet.model.exercise import Exercise
 

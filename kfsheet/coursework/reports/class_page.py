@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from html import escape
 
-from kfsheet.coursework.judging.diagnosis import RIGHT
+from kfsheet.coursework.judging.mistakes.diagnosis import RIGHT
 from kfsheet.coursework.reports.class_charts import (
     answers_by_status,
     distribution,

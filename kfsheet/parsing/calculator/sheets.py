@@ -71,6 +71,31 @@ class _Work:
     """In a circle: how far down the pile of cells put aside it reaches."""
 
 
+class _Layers(dict[Cell, Scalar]):
+    """Cells by place: those that are known, and below them what others say of theirs."""
+
+    def __init__(self, *below: Mapping[Cell, Scalar]) -> None:
+        super().__init__()
+        self._below = below
+
+    def __missing__(self, cell: Cell) -> Scalar:
+        for layer in self._below:
+            try:
+                value = self[cell] = layer[cell]
+            except KeyError:
+                continue
+            return value
+        raise KeyError(cell)
+
+    def knows(self, cell: Cell) -> bool:
+        """Whether a cell has a value, in whatever layer."""
+        try:
+            self[cell]
+        except KeyError:
+            return False
+        return True
+
+
 class SheetCalculator:
     """Values of the cells of a workbook.
 
@@ -130,7 +155,7 @@ class SheetCalculator:
             }
             for title, cells in self._contents.items()
         }  # fmt: skip
-        self._values = {title: dict(cells) for title, cells in self._constants.items()}
+        self._values = {title: _Layers(cells) for title, cells in self._constants.items()}
         self._arithmetic, self._extent = arithmetic, extent
         self._forget()
 
@@ -183,12 +208,13 @@ class SheetCalculator:
     def with_values(self, values: Mapping[str, Mapping[Cell, Scalar]]) -> SheetCalculator:
         """The same workbook where some cells have values, whatever formulas stand in them.
 
-        :meth:`formula_value` says what such a cell's formula would give.
+        :meth:`formula_value` says what such a cell's formula would give. Values are asked for cell
+        by cell as they are needed, and may be made then.
         """
         other = object.__new__(SheetCalculator)
         other.__dict__.update(self.__dict__)
         other._values = {
-            title: {**cells, **values.get(title, {})} for title, cells in self._constants.items()
+            title: _Layers(values.get(title, {}), cells) for title, cells in self._constants.items()
         }
         other._forget()
         return other
@@ -197,15 +223,16 @@ class SheetCalculator:
         """Whether a formula fills a cell, be it one of an array."""
         return address in self._parts or isinstance(self._content(address), Formula)
 
-    def formula_value(self, address: Address) -> Scalar:
+    def formula_value(self, address: Address, formula: Formula | None = None) -> Scalar:
         """What the formula that fills a cell gives there, whatever value the cell has; see value.
 
-        Cells that it reads and that have values keep them, its own cell among them.
+        Cells that it reads and that have values keep them, its own cell among them. Another
+        ``formula`` may be asked for, as if it stood there.
         """
-        master = self._parts.get(address, address)
+        master = address if formula else self._parts.get(address, address)
         for _ in range(DEEPEST):
             try:
-                value = self._evaluate(master)
+                value = self._run(master, formula) if formula else self._evaluate(master)
                 break
             except CellsNeededError as needed:
                 for cell in needed.addresses:
@@ -228,7 +255,7 @@ class SheetCalculator:
         """
         address = (self._title(address[0]), *address[1:])
         known = self._values[address[0]]
-        if address[1:] not in known and address not in self._unread:
+        if not known.knows(address[1:]) and address not in self._unread:
             self._calculate(address)
         if address in self._unread:
             raise self._unread[address]
@@ -275,7 +302,7 @@ class SheetCalculator:
         before = [
             a for a in self._spillers
             if a[0] == sheet and a[1] <= row and a[2] <= column and a not in self._aside
-            and a[1:] not in self._values[sheet] and a not in self._unread
+            and not self._values[sheet].knows(a[1:]) and a not in self._unread
         ]  # fmt: skip
         if before:
             raise CellsNeededError(before)
@@ -322,8 +349,8 @@ class SheetCalculator:
             top = self._pile[-1]
             if top.waiting:
                 following = top.waiting.pop()
-                known = following[1:] in self._values[following[0]] or following in self._unread
-                if not known and following not in self._aside:
+                known = self._values[following[0]].knows(following[1:])
+                if not known and following not in self._unread and following not in self._aside:
                     self._put_on(following)
                 continue
             try:
@@ -372,12 +399,16 @@ class SheetCalculator:
             return _element(self._arrays.get(master, Error.CIRC), address, master)
         if not isinstance(content, Formula):
             self._ask_spillers(address)
-            return self._values[sheet].get(tuple(cell), EMPTY)
+            values = self._values[sheet]
+            return values[tuple(cell)] if values.knows(tuple(cell)) else EMPTY
+        return self._run(address, content)
+
+    def _run(self, address: Address, formula: Formula) -> Scalar:
         context = self._context
         context.host, context.work, context.variables = address, self._work, {}
-        value = self._program(address, content)(context)
-        if content.area or (content.dynamic and type(value) is tuple):
-            return self._spread(address, content, value)
+        value = self._program(address, formula)(context)
+        if formula.area or (formula.dynamic and type(value) is tuple):
+            return self._spread(address, formula, value)
         if is_reference(value) or type(value) is tuple:
             value = intersect(context, value)
         return context.arithmetic.from_float(0.0) if value is EMPTY else value
@@ -435,6 +466,8 @@ def _without_foreign(tree: tuple) -> tuple:
     """The tree with whole columns, rows and sheets as references, which know distances."""
     if tree[0] == "foreign":
         return foreign(tree[1])
+    if tree[0] == "reference" and ":" in (tree[1].sheet or ""):
+        return ("sheets", *tree[1].sheet.split(":", 1), tree)
     return tuple(_without_foreign(p) if isinstance(p, tuple) else p for p in tree)
 
 

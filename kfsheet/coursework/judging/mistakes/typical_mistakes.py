@@ -24,7 +24,6 @@ SWAPPED = "the two arguments of ATAN2 are swapped; Excel takes ATAN2(x, y)"
 FUNCTION = "sine and cosine are confused"
 NO_SIGN = "the sign of a velocity or an angle is lost: a square or ABS forgets it"
 OTHER = "a reference points to another column or parameter of the same unit"
-MOST = 400
 
 
 def typical_mistakes(model: Recurrence, key: Expr) -> Iterator[tuple[str, Expr]]:
@@ -33,9 +32,11 @@ def typical_mistakes(model: Recurrence, key: Expr) -> Iterator[tuple[str, Expr]]
     yield TWO, 2 * key
     yield TWO, key / 2
     yield from _all_lags(key)
-    for path, node in _nodes(key, ()):
-        for words, other in _of_node(model, node):
-            yield words, _replaced(key, path, other)
+    # Where one quantity is like another, so are many mistakes: the plainer explanation comes first.
+    for of_node in (_of_node, _others):
+        for path, node in _nodes(key, ()):
+            for words, other in of_node(model, node):
+                yield words, _replaced(key, path, other)
 
 
 def _nodes(e: Basic, path: tuple[int, ...]) -> Iterator[tuple[tuple[int, ...], Basic]]:
@@ -109,11 +110,16 @@ def _of_atom(model: Recurrence, e: Indexed | Symbol) -> Iterator[tuple[str, Expr
         for other in (back + 1, back - 1):
             if other >= 0:
                 yield LAG, e.base[t - other]
+
+
+def _others(model: Recurrence, e: Basic) -> Iterator[tuple[str, Expr]]:
+    """Another quantity of the same unit in the place of one."""
+    if isinstance(e, Indexed):
         for name in _of_unit(model, str(e.base.label), model.table):
             yield OTHER, model[name][e.indices[0]]
-        return
-    for name in _of_unit(model, e.name, {**model.parameters, **model.derived_scalars}):
-        yield OTHER, model[name]
+    elif isinstance(e, Symbol) and e != t:
+        for name in _of_unit(model, e.name, {**model.parameters, **model.derived_scalars}):
+            yield OTHER, model[name]
 
 
 def _of_unit(model: Recurrence, name: str, others: dict) -> list[str]:
