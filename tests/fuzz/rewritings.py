@@ -123,7 +123,7 @@ def wrapped_number(line, part, counts):
         binary("-", binary("+", x, ONE), ONE),
         call("ROUND", x, ("number", 14.0)), call("SUMPRODUCT", binary("*", x, ONE)),
         ("unary", "%", binary("*", ("number", 100.0), x)), call("TRUNC", x, ("number", 14.0)),
-        call("IMREAL", x), call("INDEX", call("CHOOSE", ("array", ("row", ONE, TWO)), x, ZERO), ONE)
+        call("INDEX", call("CHOOSE", ("array", ("row", ONE, TWO)), x, ZERO), ONE)
         if "IF" not in text_of(x) else binary("+", x, ZERO),
         binary("/", binary("*", x, ("number", 7.0)), ("number", 7.0)),
         call("SUM", x, ("number", 5.0), ("unary", "-", ("number", 5.0))),
