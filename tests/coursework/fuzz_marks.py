@@ -93,7 +93,9 @@ def _grade(course, answers, tally):
             marks = course.marks([answer for answer, _ in given], path)
             found = [_judged(course, a, told, marks[a.question.name], tally) for a, told in given]
             if KEEP and any(found):
-                shutil.copy(path, KEEP / f"{course.exercise.name}_{sum(tally.counts.values())}.xlsx")
+                shutil.copy(
+                    path, KEEP / f"{course.exercise.name}_{sum(tally.counts.values())}.xlsx"
+                )
 
 
 def _judged(course, answer, told, mark, tally):

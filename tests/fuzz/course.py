@@ -7,15 +7,15 @@ from functools import cached_property
 from pathlib import Path
 
 import openpyxl
+from openpyxl.utils import get_column_letter
+from students import ADA, SECRET
+
 from fuzz.mutations import mutated
 from fuzz.oracle import Oracle, cells_of, runs, verdict
 from fuzz.papers import Paper
 from fuzz.question import Line, Question, key_cells
 from fuzz.rewritings import rewritten
 from fuzz.trees import text_of
-from openpyxl.utils import get_column_letter
-from students import ADA, SECRET
-
 from kfsheet import load_exercise
 from kfsheet.coursework.handout.handout_workbook import handout_of_run, solution_of_run
 from kfsheet.coursework.reports.assessment import assess

@@ -1,11 +1,10 @@
 """Mistakes: changes of a formula's tree that probably change a value in some row or world."""
 
-import re
+from openpyxl.utils import get_column_letter
 
 from fuzz.question import REFERENCE
 from fuzz.rewritings import ONE, TWO, ZERO
 from fuzz.trees import binary, call, number, places, replaced
-from openpyxl.utils import get_column_letter
 
 EMPTY = ("text", "")
 SWAPS = {

@@ -7,10 +7,10 @@ import tempfile
 from pathlib import Path
 
 import openpyxl
-from fuzz.papers import Paper
-from fuzz.question import HELPER_SHEET, moved, qualified
 from openpyxl.utils import get_column_letter
 
+from fuzz.papers import Paper
+from fuzz.question import HELPER_SHEET, moved, qualified
 from kfsheet.coursework.handout.handout_workbook import solution_of_run
 from kfsheet.coursework.handout.own_numbers import own_numbers
 from kfsheet.errors import KfsheetError

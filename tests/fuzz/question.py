@@ -4,10 +4,10 @@ import random
 import re
 from functools import cached_property
 
-from fuzz.trees import read
 from openpyxl.utils import column_index_from_string, get_column_letter
 from students import Paper as StudentsPaper
 
+from fuzz.trees import read
 from kfsheet.workbook.write.layout import FIRST_ROW
 
 REFERENCE = re.compile(
@@ -61,7 +61,7 @@ class Line:
         """The tree of the formula behind a reference or name, as seen from here, or None."""
         place = self.place(text)
         formula = place and self.course.formulas.get(place)
-        if not formula or place[0] == self.question.sheet and place[2] == self.question.column:
+        if not formula or (place[0] == self.question.sheet and place[2] == self.question.column):
             return None
         if any(f"{title}!" in formula.replace("'", "") for title in self.course.exercise.frozen):
             return None  # a handout holds numbers there

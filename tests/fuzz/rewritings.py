@@ -185,7 +185,8 @@ def named(line, part, counts):
     if part[1] in line.course.exercise.model.parameters:
         low, high = line.course.parameter_rows
         area, labels = f"Parameters!$B${low}:$B${high}", f"Parameters!$A${low}:$A${high}"
-        forms += [f"INDEX({area},MATCH(\"{part[1]}\",{labels},0))", f"INDEX({area},{row - low + 1})",
+        forms += [f"INDEX({area},MATCH(\"{part[1]}\",{labels},0))",
+                  f"INDEX({area},{row - low + 1})",
                   f"VLOOKUP(\"{part[1]}\",Parameters!$A${low}:$B${high},2,FALSE)"]  # fmt: skip
     if part[1] == "dt" and line.course.has_time and not line.question.is_scalar:
         forms += ["($B$5-$B$4)", "($B$8-$B$7)", "SLOPE($B$4:$B$9,$A$4:$A$9)", "($B$9-$B$5)/4",
@@ -217,10 +218,12 @@ def guarded(line, part, counts):
     return line.dice.choice([
         call("IF", call("NOT", test), b, a), call("IF", binary("=", call("COUNT", x), ONE), a, b),
         call("IF", call("COUNT", x), a, b), call("IF", binary("<>", x, empty), a, b),
-        call("IF", binary("=", x, empty), b, a), call("IF", binary(">", call("LEN", x), ZERO), a, b),
+        call("IF", binary("=", x, empty), b, a),
+        call("IF", binary(">", call("LEN", x), ZERO), a, b),
         call("IF", call("ISBLANK", x), b, a), call("IF", call("ISTEXT", x), b, a),
         call("CHOOSE", binary("+", ONE, test), b, a), call("IFS", test, a, ("truth", True), b),
-        call("SWITCH", test, ("truth", True), a, b), call("CHOOSE", binary("-", TWO, call("COUNT", x)), a, b),
+        call("SWITCH", test, ("truth", True), a, b),
+        call("CHOOSE", binary("-", TWO, call("COUNT", x)), a, b),
         call("IF", call("ISERROR", binary("/", ONE, test)), b, a), call("IF", test, part, b),
         call("IF", call("AND", test, binary("=", ONE, ONE)), a, b),
         call("IF", binary("=", test, ("truth", False)), b, a),
@@ -301,7 +304,9 @@ def helped(line, part, counts):
     if part[0] in ("omitted", "number", "text", "truth") or len(line.helpers) > 3:
         return None
     # A cell that points to an empty one holds 0 in Excel, and nothing in LibreOffice.
-    if not is_number(part) and any(line.course.may_be_empty(line.place(ref)) for ref in _refs(part)):
+    if not is_number(part) and any(
+        line.course.may_be_empty(line.place(ref)) for ref in _refs(part)
+    ):
         return None
     elsewhere = line.dice.random() < 0.4
     found = line.helper(part, elsewhere)
