@@ -87,7 +87,7 @@ def football_marks(people: list[Student], folder: Path, out: Path) -> None:
 
 
 def hostile(folder: Path) -> Line:
-    """What a class takes longer if one of its formulas was written to be slow: the worst of some."""
+    """What a class takes longer if one formula was written to be slow: the worst of some."""
     people = [Student(f"s{n:03d}", f"Student {n}") for n in range(SMALL_CLASS)]
     home = folder / "small"
     home.mkdir()

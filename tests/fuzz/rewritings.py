@@ -227,7 +227,7 @@ def guarded(line, part, counts):
         call("IF", call("ISERROR", binary("/", ONE, test)), b, a), call("IF", test, part, b),
         call("IF", call("AND", test, binary("=", ONE, ONE)), a, b),
         call("IF", binary("=", test, ("truth", False)), b, a),
-        call("IF", binary("=", call("TYPE", x), ONE), a, b), call("IF", call("OR", test), a, b),
+        call("IF", call("OR", test), a, b),
         call("IF", call("ISNONTEXT", x), call("IF", test, a, b), b),
         call("IF", binary("=", call("N", test), ONE), a, b),
     ])  # fmt: skip
