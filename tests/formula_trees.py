@@ -12,6 +12,14 @@ SIGNS = 6
 
 def tree_of(text):
     """The tree of a formula, in the form of kfsheet.parsing."""
+    reader = Reader([*split_tokens(text), (None, None)])
+    tree = reader.expression(0)
+    assert reader.next[0] is None, text
+    return tree
+
+
+def split_tokens(text):
+    """The tokens of a formula, as (kind, text)."""
     items = Tokenizer(text if text.startswith("=") else f"={text}").items
     found = []
     for i, token in enumerate(items):
@@ -19,10 +27,7 @@ def tree_of(text):
             found += _split(token)
         elif 0 < i < len(items) - 1 and _ends(items[i - 1]) and _begins(items[i + 1]):
             found.append(("op", " "))
-    reader = _Reader([*found, (None, None)])
-    tree = reader.expression(0)
-    assert reader.next[0] is None, text
-    return tree
+    return found
 
 
 def _ends(token):
@@ -53,7 +58,7 @@ def _split(token):
     return [(f"{token.type} {token.subtype}", value)]
 
 
-class _Reader:
+class Reader:
     def __init__(self, tokens):
         self.tokens, self.at = tokens, 0
 

@@ -181,6 +181,14 @@ def _formatted(c: Context, value: Scalar, form: str) -> str:
         + after.strip('"')  # fmt: skip
 
 
+def _fixed(c: Context, value: Number, places: int = 2, plain: int = 0) -> str:
+    """A number with so many places, and a comma at the thousands unless ``plain``."""
+    if places < 0:
+        raise UnsupportedError("FIXED with fewer than 0 places is not calculated")
+    units = "0" if plain else "#,##0"
+    return _formatted(c, value, f"{units}.{'0' * places}" if places else units)
+
+
 def _scientific(x: float, places: int, width: int) -> str:
     digits, _, power = f"{x:.{places}E}".partition("E")
     return f"{digits}E{power[0]}{abs(int(power)):0{width}d}"
@@ -273,6 +281,7 @@ FUNCTIONS: dict[str, Entry] = {name: _test(holds) for name, holds in TESTS.items
     "ERROR.TYPE": each("V", _error_number),
     "VALUE": each("v", _value),
     "TEXT": each("vt", _formatted),
+    "FIXED": each("nii", _fixed, 1),
     "CONCATENATE": whole(1, MANY, _concatenate),
     "CONCAT": whole(1, MANY, _concat),
     "TEXTJOIN": whole(3, MANY, _text_join),
