@@ -101,7 +101,8 @@ def moved(parts):
     """Another folder, and relations that name parts from the root of the file."""
     parts = everywhere("xl/worksheets/sheet", "xl/pages/page")(parts)
     rels = "xl/_rels/workbook.xml.rels"
-    links = re.sub(rb'Target="/?(?:xl/)?worksheets/sheet', b'Target="/xl/pages/page', parts[rels])
+    there = b'Target="%sxl/pages/page' % b"/"
+    links = re.sub(rb'Target="/?(?:xl/)?worksheets/sheet', there, parts[rels])
     return {**parts, rels: links}
 
 

@@ -225,7 +225,10 @@ def _count_ifs(c: Context, *parts: Value) -> Number:
 def _count_if(c: Context, where: Value, wanted: Value) -> Value:
     area = area_of(where)
     if type(wanted) is not str or not criterion(c, wanted)(EMPTY):
-        count = lambda one: c.arithmetic.from_float(float(len(_met(c, [(area, one)]))))  # noqa: E731
+
+        def count(one: Scalar) -> Number:
+            return c.arithmetic.from_float(float(len(_met(c, [(area, one)]))))
+
         return _over_criteria(c, wanted, count)
     part = used(c, area)  # cells beyond those in use are empty and meet it, too
     beyond = area.height * area.width - part.height * part.width
