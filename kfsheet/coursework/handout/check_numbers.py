@@ -82,4 +82,4 @@ def looks_right(value: float, kept: float, own: float) -> bool:
     power = floor(kept)
     if not abs(value) < LARGEST / own * 2.0**power:
         return False
-    return abs((value * own / 2.0**power + kept) % 1 - 0.5) < WINDOW
+    return abs((value / 2.0**power * own + kept) % 1 - 0.5) < WINDOW
