@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
 from pathlib import Path
 
-from kfsheet.errors import WorkbookError
+from kfsheet.errors import UnwrittenError
+
+FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
 
 def write_file(path: str | Path, content: bytes) -> Path:
@@ -14,8 +17,8 @@ def write_file(path: str | Path, content: bytes) -> Path:
 
     Raises
     ------
-    WorkbookError
-        If the folder cannot be made or written, naming it.
+    UnwrittenError
+        If the folder cannot be made or written, or the disk is full, naming the file.
     """
     path = Path(path)
     try:
@@ -28,9 +31,11 @@ def write_file(path: str | Path, content: bytes) -> Path:
             file.write(content)
         os.chmod(temporary, 0o666 & ~_umask())
         os.replace(temporary, path)
-    except OSError as error:
+    except BaseException as error:  # also if somebody interrupts us
         Path(temporary).unlink(missing_ok=True)
-        raise _unwritable(path, error) from None
+        if isinstance(error, OSError):
+            raise _unwritable(path, error) from None
+        raise
     return path
 
 
@@ -40,8 +45,8 @@ def _umask() -> int:
     return mask
 
 
-def _unwritable(path: Path, error: OSError) -> WorkbookError:
-    return WorkbookError(
-        f"{path} cannot be written ({error.strerror}); choose another folder, "
-        "or close the file if a program holds it open"
-    )
+def _unwritable(path: Path, error: OSError) -> UnwrittenError:
+    remedy = "choose another folder, or close the file if a program holds it open"
+    if error.errno in FULL:
+        remedy = "make room on the disk"
+    return UnwrittenError(f"{path} cannot be written ({error.strerror}); {remedy}")

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import sys
+from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -15,9 +17,10 @@ from kfsheet.errors import KfsheetError, ModelError, WorkbookError
 
 if TYPE_CHECKING:
     from kfsheet.model.exercise import Exercise
+    from kfsheet.workbook.check.report import Report
 
 MOST_LINES = 20
-ENGINE_NAMES = ("ironcalc", "libreoffice")  # said again: --help imports no engines
+ENGINE_NAMES = ("ironcalc", "libreoffice", "own")  # said again: --help imports no engines
 
 
 class Parser(argparse.ArgumentParser):
@@ -65,6 +68,9 @@ def parser() -> Parser:
         metavar="FILE.py",
         help="the file that defines the exercise, for workbooks of your own",
     )
+    check.add_argument(
+        "--format", choices=["text", "json"], default="text", help="lines, or one JSON list"
+    )
     check.set_defaults(run=run_check)
 
     show = commands.add_parser("show", help="print a model in another dress")
@@ -108,17 +114,24 @@ def _warn_of_units(exercise: Exercise) -> None:
 
 def run_check(arguments: argparse.Namespace) -> int:
     """Check workbooks; one that cannot be checked does not keep the others from it."""
-    status = HOLDS
+    status, found = HOLDS, []
     for path in progress(arguments.workbooks, "check", len(arguments.workbooks)):
         try:
-            status = max(status, _check_one(Path(path), arguments))
+            report = _check_one(Path(path), arguments)
         except KfsheetError as error:
             complain(error)
             status = WRONG_USE
+            continue
+        status = max(status, HOLDS if report.holds else DOES_NOT_HOLD)
+        found.append(report.as_dict())
+        if arguments.format == "text":
+            _print_report(report)
+    if arguments.format == "json":
+        print(json.dumps(found, indent=1))
     return status
 
 
-def _check_one(path: Path, arguments: argparse.Namespace) -> int:
+def _check_one(path: Path, arguments: argparse.Namespace) -> Report:
     from kfsheet.workbook.engines.recalculate import start_engine
 
     # It loads and calculates the workbook while SymPy is imported, which takes as long.
@@ -135,13 +148,16 @@ def _check_one(path: Path, arguments: argparse.Namespace) -> int:
         )
 
     exercise = load_exercise(arguments.exercise) if arguments.exercise else ours
-    report = check_workbook(path, exercise, arguments.engine, started=started)
-    lines = [f"changed: {change}" for change in report.changed] + report.lines()[:MOST_LINES]
+    return check_workbook(path, exercise, arguments.engine, started=started)
+
+
+def _print_report(report: Report) -> None:
+    lines = [f"{report.instead}; another one calculates"] if report.instead else []
+    lines += [f"changed: {change}" for change in report.changed] + report.lines()[:MOST_LINES]
     if (more := len(report.lines()) - MOST_LINES) > 0:
         lines.append(f"... and {more} more lines like these")
     for line in (*lines, report.verdict):
-        print(f"{path}: {line}")
-    return HOLDS if report.holds else DOES_NOT_HOLD
+        print(f"{report.path}: {line}")
 
 
 def run_show(arguments: argparse.Namespace) -> int:
@@ -155,6 +171,9 @@ def run_show(arguments: argparse.Namespace) -> int:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line and return the exit status: 0, 1 "it does not hold", 2 wrong use."""
+    for stream in (sys.stdout, sys.stderr):  # a name may hold what the terminal cannot show
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     try:
         chosen = parser().parse_args(arguments)
         return chosen.run(chosen)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kfsheet.cli.terminal import DOES_NOT_HOLD, HOLDS, complain, progress
-from kfsheet.errors import DataError
+from kfsheet.errors import DataError, UnwrittenError
 
 if TYPE_CHECKING:
     from kfsheet.coursework.reports.assessment import Assessment
@@ -40,6 +40,9 @@ def add_commands(commands: argparse._SubParsersAction, exercise: str) -> None:
     )
     handout.add_argument(
         "--force", action="store_true", help="also replace handouts that would become others"
+    )
+    grade.add_argument(
+        "--show-key", action="store_true", help="also write a right formula into the feedback"
     )
     handout.set_defaults(run=run_handout)
     grade.set_defaults(run=run_grade)
@@ -103,11 +106,18 @@ def run_handout(arguments: argparse.Namespace) -> int:
 
 def run_grade(arguments: argparse.Namespace) -> int:
     """Grade a folder of submissions; a bad file is a status in the table, not an error."""
+    try:
+        return _grade(arguments)
+    except UnwrittenError as error:  # a full disk is no wrong call
+        complain(error)
+        return DOES_NOT_HOLD
+
+
+def _grade(arguments: argparse.Namespace) -> int:
     from kfsheet.coursework.handout.course_secret import read_secret
     from kfsheet.coursework.reading.results_folder import belongs_to, claim
     from kfsheet.coursework.reading.roster import read_roster
-    from kfsheet.coursework.reading.submitted_files import passed_over
-    from kfsheet.coursework.reports.assessment import NO_TOKEN
+    from kfsheet.coursework.reading.submitted_files import passed_over, readable
     from kfsheet.coursework.reports.grading import grade, override
     from kfsheet.coursework.reports.overrides import read_overrides, with_all_marks
     from kfsheet.coursework.reports.report_files import write_reports
@@ -131,14 +141,29 @@ def run_grade(arguments: argparse.Namespace) -> int:
         progress=lambda items, count: progress(items, "grade", count, _judged),
     )
     results = override([with_all_marks(r, exercise) for r in results], iter(lines))
-    for path in write_reports(exercise, results, handed, out):
+    for path in write_reports(exercise, results, handed, out, show_key=arguments.show_key):
         print(path)
     _summarize(results, handed, out)
-    if skipped := [path.name for path in passed_over(arguments.submissions, out)]:
+    if skipped := [readable(path.name) for path in passed_over(arguments.submissions, out)]:
         print(f"files passed over: {len(skipped)} ({', '.join(skipped[:5])})")
+    return _whole(handed)
+
+
+def _whole(handed: list[Handed]) -> int:
+    """Exit status: whether all that was found could be judged, and kept."""
+    from kfsheet.coursework.reports.assessment import NO_TOKEN, NOT_OWN
+
     found = [file.assessment for file in handed]
-    if any(a.status == NO_TOKEN for a in found) and not any(a.student for a in found):
+    if unwritten := sorted({a.unwritten for a in found if a.unwritten}):
+        more = f" (and {len(unwritten) - 1} more files)" if len(unwritten) > 1 else ""
+        raise UnwrittenError(f"{unwritten[0]}; then grade again{more}")
+    ours = {a.status for a in found if a.student}
+    if any(a.status == NO_TOKEN for a in found) and not ours:
         complain(DataError("no file carries a token of this course; is --secret the right file?"))
+        return DOES_NOT_HOLD
+    if ours == {NOT_OWN} and len(found) > 1:
+        words = "no file holds its student's numbers; did the exercise change since the handout?"
+        complain(DataError(words))
         return DOES_NOT_HOLD
     return HOLDS
 
@@ -152,5 +177,7 @@ def _summarize(results: list[Result], handed: list[Handed], out: Path) -> None:
 
 def _judged(item: tuple[Path, Assessment]) -> str:
     """Whose file it was, or what it is called, and what came of it."""
+    from kfsheet.coursework.reading.submitted_files import readable
+
     path, found = item
-    return f"{found.student or path.name}, {found.status}"
+    return f"{found.student or readable(path.name)}, {found.status}"

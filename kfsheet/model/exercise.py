@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from kfsheet.errors import ModelError
 from kfsheet.model.chart import Chart
-from kfsheet.model.expressions import Missing
+from kfsheet.model.expressions import Missing, columns_read, scalars
 from kfsheet.model.recurrence import Recurrence
 
 if TYPE_CHECKING:
@@ -46,7 +48,8 @@ class Exercise:
     model : Recurrence
         The filter; its name is the name of the exercise and of its workbook.
     about : tuple of str
-        Paragraphs for the sheet "Read me": the story, and what to try.
+        Paragraphs for the sheet "Read me": the story, and what to try. ``{r_i}`` stands for the
+        value of a parameter, which in a handout is the student's own.
     source : str
         Where the exercise comes from.
     charts : tuple of Chart
@@ -70,8 +73,9 @@ class Exercise:
     task : tuple of str
         What a student must know to answer the questions, such as the model's equations in words.
     veiled : tuple of str
-        Columns and derived scalars that stay live in handouts, but hide their formulas: they repeat
-        an answer's, or a part of it.
+        Columns and derived scalars that stay live in handouts, but hide their formulas, and from
+        which an answer may not be computed, unless it builds on them. What is plainly an answer in
+        other words, or shows its formula, is found without being named here.
     sealed : tuple of str
         Worksheets whose given formulas stay live in handouts, but are hidden: they look like an
         answer's, for another axis or camera. An answer may read them.
@@ -166,6 +170,33 @@ class Exercise:
     def title(self) -> str:
         """One line for people."""
         return self.model.title
+
+    def story(self, values: Mapping[str, float]) -> tuple[str, ...]:
+        """The paragraphs of ``about`` with the values of a run's parameters in them."""
+
+        def value(match: re.Match[str]) -> str:
+            name = match[1]
+            return f"{values[name]:.10g}" if name in self.model.parameters else match[0]
+
+        return tuple(re.sub(r"\{(\w+)\}", value, paragraph) for paragraph in self.about)
+
+    @cached_property
+    def waiting(self) -> frozenset[str]:
+        """What has no value in a handout before answers are there: they, and what needs them."""
+        model = self.model
+        fixed = {c.name for c in model.table.values() if c.is_data or c.section in self.frozen}
+        rules = {c.name: c.rules for c in model.all_columns() if c.name not in fixed}
+        rules |= {s.name: s.rules for s in (model.derived_scalars | model.summaries).values()}
+        reads = {
+            name: {r for rule in those for r in (*columns_read(rule), *map(str, scalars(rule)))}
+            for name, those in rules.items()
+        }
+        found: set[str] = set()
+        new = {question.name for question in self.questions}
+        while new:
+            found |= new
+            new = {n for n, read in reads.items() if read & found} - found
+        return frozenset(found)
 
 
 def asked_steps(model: Recurrence, name: str) -> list[int]:

@@ -22,7 +22,7 @@ Address = tuple[str, int, int]
 """Sheet, row and column."""
 
 CORNER = r"(\$?)([A-Za-z]{1,3})(\$?)([1-9]\d{0,6})"
-SHEET = r"(?:'((?:[^']|'')+)'|([^'!\[\]:*?/\\ ]+))!"
+SHEET = r"(?:'((?:[^'\[\]:*?/\\]|'')+)'|([^'!\[\]:*?/\\ ]+))!"
 REFERENCE = re.compile(rf"(?:{SHEET})?{CORNER}(?::{CORNER})?")
 NAME = re.compile(rf"(?:{SHEET})?([A-Za-z_][A-Za-z0-9_.]*)")
 # Quoted text and sheet names are left alone; LOG10( is a function, x_A1 and A1.b are names.

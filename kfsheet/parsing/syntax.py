@@ -16,12 +16,14 @@ Everything that a spreadsheet can hold has a node here; what of it is mathematic
 from __future__ import annotations
 
 import re
+from math import isinf
 from typing import NamedTuple
 
-from kfsheet.errors import FormulaError
+from kfsheet.errors import FormulaError, TooMuchWorkError
 from kfsheet.parsing.references import read_reference
 
-LONGEST = 2_000  # characters; kfsheet's own stay below 255, Excel's limit is 8,192
+LONGEST = 8_192  # characters, as in Excel
+MOST_ARGUMENTS = 255  # as in Excel
 DEEPEST = 60  # levels of parentheses, calls and signs
 HIGHEST = 256  # levels of a tree, say terms of a sum; each is three calls on a stack of 1,000
 
@@ -50,6 +52,7 @@ TOKEN = re.compile(
 LEVELS = {"=": 1, "<>": 1, "<": 1, "<=": 1, ">": 1, ">=": 1, "&": 2, "+": 3, "-": 3}
 LEVELS |= {"*": 4, "/": 4, "^": 5, " ": 7, ":": 8}  # the signs and % stand at 6, see _signed
 TIGHT = 7
+GOOGLES = "__XLUDF.DUMMYFUNCTION"
 
 
 class Token(NamedTuple):
@@ -103,8 +106,8 @@ def _unreadable(place: int) -> FormulaError:
     return FormulaError(f"the formula cannot be read near its character {place + 1}")
 
 
-def _too_deep(levels: int) -> FormulaError:
-    return FormulaError(f"the formula is nested deeper than {levels} levels")
+def _too_deep(levels: int) -> TooMuchWorkError:
+    return TooMuchWorkError(f"the formula is nested deeper than {levels} levels")
 
 
 def _height(tree: Tree) -> int:
@@ -114,6 +117,17 @@ def _height(tree: Tree) -> int:
         level = [part for node in level for part in node[1:] if isinstance(part, tuple)]
         height += 1
     return height
+
+
+def _original(call: Tree) -> Tree:
+    """What Google Sheets hides where Excel has no such formula: the formula itself, as a text.
+
+    IFERROR around it holds the value that Google calculated, which is not believed.
+    """
+    text = call[2][1] if len(call) == 3 and call[2][0] == "text" else ""
+    if not text or text.startswith('"'):  # "COMPUTED_VALUE", of a cell that another one fills
+        raise FormulaError("Google Sheets has saved the value only; download it as values")
+    return parse_formula(text)
 
 
 class _Parser:
@@ -179,7 +193,10 @@ class _Parser:
         raise _unreadable(token.place)
 
     def _number(self, token: Token) -> Tree:
-        return ("number", float(token.text))
+        value = float(token.text)
+        if isinf(value):  # beyond 1.8E308
+            raise _unreadable(token.place)
+        return ("number", value)
 
     def _text(self, token: Token) -> Tree:
         return ("text", token.text[1:-1].replace('""', '"'))
@@ -203,8 +220,12 @@ class _Parser:
             return ("call", name)
         arguments = [self._argument()]
         while self._took(","):
+            if len(arguments) == MOST_ARGUMENTS:
+                raise FormulaError(f"{name} has more than {MOST_ARGUMENTS} arguments")
             arguments.append(self._argument())
         self.expect(")")
+        if name == "IFERROR" and arguments[0][:2] == ("call", GOOGLES):
+            return _original(arguments[0])
         return ("call", name, *arguments)
 
     def _argument(self) -> Tree:

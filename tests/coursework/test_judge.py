@@ -457,15 +457,6 @@ def test_a_lost_sign_is_not_called_a_number(football):
     assert "sign of a velocity" in mark.remark
 
 
-def test_a_column_that_repeats_the_answer_is_no_answer(football):
-    football.answer_all()
-    for cell, _ in football.cells("u")[1:]:
-        cell.value = f"='Goal line'!C{cell.row - 1}"
-    mark = one(football, "u")
-    assert mark.score < mark.points
-    assert "repeats the answer" in mark.remark
-
-
 def test_a_wrong_sign_filled_down_from_the_first_row_is_named(football):
     """The first row has a start rule of its own; the kind of mistake is that of all the others."""
     football.answer_all()

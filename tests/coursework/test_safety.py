@@ -16,10 +16,11 @@ from kfsheet import load_exercise
 from kfsheet.coursework.handout.handout_workbook import handout_bytes
 from kfsheet.coursework.reading import submission
 from kfsheet.coursework.reading.submission import read_submission
-from kfsheet.coursework.reading.worksheet import Formula
 from kfsheet.coursework.reports.assessment import assess
 from kfsheet.coursework.reports.grading import STATUSES
 from kfsheet.coursework.worker_pool import Failed, Pool
+from kfsheet.parsing.calculator import Formula
+from kfsheet.workbook.reading import archive
 
 FUZZED = 2_000
 EXERCISE = load_exercise("football")
@@ -60,8 +61,8 @@ def zeros(name, size):
 HOSTILE = {
     "empty": (lambda p: b"", "empty file"),
     "text": (lambda p: b"id;name\n1;2\n", "wrong kind"),
-    "old xls": (lambda p: submission.OLE + bytes(600), "wrong kind"),
-    "encrypted": (lambda p: submission.OLE + bytes(9) + submission.ENCRYPTED, "encrypted"),
+    "old xls": (lambda p: archive.OLE + bytes(600), "wrong kind"),
+    "encrypted": (lambda p: archive.OLE + bytes(9) + archive.ENCRYPTED, "encrypted"),
     "cut": (lambda p: p.read_bytes()[:9000], "damaged"),
     "zip of something": (lambda p: made_zip({"readme.txt": b"x"}), "wrong kind"),
     "bomb": (lambda p: rezipped(p, {}, [zeros("xl/bomb.xml", 60 * 2**20)]), "too large"),

@@ -56,5 +56,5 @@ def test_check_names_the_extra_in_one_line(without_ironcalc):
 def test_recalculate_names_the_extra(without_ironcalc):
     done = without_ironcalc("-c", f"import kfsheet; kfsheet.recalculate({str(FOOTBALL)!r})")
     last = done.stderr.splitlines()[-1]
-    assert last.startswith("kfsheet.errors.EngineError: ")
+    assert last.startswith("kfsheet.errors.MissingEngineError: ")
     assert REMEDY in last

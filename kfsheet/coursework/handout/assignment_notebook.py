@@ -63,7 +63,9 @@ def assignment(exercise: Exercise, *, solved: bool) -> Any:
         raise ModelError(f"{exercise.name} asks no questions; list them in Exercise(questions=...)")
     runs = ModelRuns(exercise)
     cells = [
-        v4.new_markdown_cell("\n\n".join([f"# {exercise.title}", *exercise.about])),
+        v4.new_markdown_cell(
+            "\n\n".join([f"# {exercise.title}", *exercise.story(exercise.model.defaults())])
+        ),
         v4.new_code_cell(START),
         *(cell for question in exercise.questions for cell in _cells(runs, question)),
     ]

@@ -33,8 +33,12 @@ def read_secret(path: str | Path, *, make: bool = False) -> bytes:
             path.parent.mkdir(parents=True, exist_ok=True)
             # Never over another secret, and for the owner only from its first byte on.
             handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-            with os.fdopen(handle, "w") as file:
-                file.write(secrets.token_hex(LENGTH) + "\n")
+            try:
+                with os.fdopen(handle, "w") as file:
+                    file.write(secrets.token_hex(LENGTH) + "\n")
+            except OSError:
+                path.unlink()  # half a secret, on a full disk, would be taken for one
+                raise
         content = path.read_bytes().strip()
     except OSError as error:
         raise DataError(f"the secret {path} cannot be used: {error.strerror}") from None

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 from kfsheet.coursework.handout.questions_sheet import SHEET
+from kfsheet.coursework.handout.shown_answers import shown_answers
 from kfsheet.model.exercise import Exercise, asked_steps
 from kfsheet.workbook.write.layout import FIRST_ROW, WORDS_ROW, Layout
 from kfsheet.workbook.write.run import Run
@@ -13,9 +15,12 @@ from kfsheet.workbook.write.styles import LEGEND
 from kfsheet.workbook.write.write_workbook import compose
 
 YOURS = (
-    "This is your own workbook: its parameters and data are drawn for you alone, so they differ "
-    "from the numbers in the words below. What to do stands on the sheet Questions."
+    "This is your own workbook: its parameters and data are drawn for you alone. What to do stands "
+    "on the sheet Questions. What is not orange is locked; what follows from your answers is empty "
+    "until they are there."
 )
+OWN_PARAMETERS = "your own numbers, and what follows from them"
+NUMBERS_ONLY = "This sheet holds numbers: its formulas would give answers away."
 LOCKED = {
     LEGEND["parameter"]: "a parameter: your own number, locked; the feedback holds for it only",
     LEGEND["data"]: "a measurement or another given number, locked; an empty one was not made",
@@ -25,19 +30,43 @@ LOCKED = {
 
 def with_empty_answers(exercise: Exercise, layout: Layout, now: Run) -> list[Sheet]:
     """The exercise's worksheets with empty answers, without "Check", which knows the answers."""
-    words = replace(exercise, about=(YOURS, exercise.about[0]), notebook="")
-    pages = {p.title: p for p in compose(words, layout, now, now) if p.title != "Check"}
+    pages = {p.title: p for p in compose(_in_own_words(exercise, now), layout, now, now)}
+    del pages["Check"]
     for question in exercise.questions:
         _empty(pages, layout, question.name)
     for section in exercise.frozen:
         _freeze(pages[section])
     for section in exercise.sealed:
         _seal(pages[section])
-    for name in exercise.veiled:
+    for name in sorted(shown_answers(exercise)):
         _veil(pages, layout, name)
-    _mend_read_me(pages["Read me"])
+    _mend_read_me(pages["Read me"], exercise)
     pages["Parameters"].put(2, 1, "These are your own numbers; everything follows from them.")
     return list(pages.values())
+
+
+def _in_own_words(exercise: Exercise, now: Run) -> Exercise:
+    """The exercise's words without what was said of other numbers, or asks to change some."""
+    about = (YOURS, *_still_true(exercise, now))
+    # What stands below a chart with a number in it was seen in the exercise's own run.
+    charts = tuple(
+        replace(chart, note="") if re.search(r"\d", chart.note) else chart
+        for chart in exercise.charts
+    )
+    return replace(exercise, about=about, charts=charts, notebook="")
+
+
+def _still_true(exercise: Exercise, now: Run) -> list[str]:
+    """The story, without sentences that tell the exercise's value of a parameter that differs."""
+    others = {
+        f"{parameter.value:.10g}"
+        for name, parameter in exercise.model.parameters.items()
+        if parameter.value != now.scalars[name]
+    }
+    sentences = re.split(r"(?<=[.!?])\s+", exercise.about[0]) if exercise.about else []
+    numbers = r"(?<![\w.{])\d+(?:\.\d+)?(?![\w}])"
+    kept = [s for s in sentences if not others & set(re.findall(numbers, s))]
+    return [" ".join(kept)] if kept else []
 
 
 def _empty(pages: dict[str, Sheet], layout: Layout, name: str) -> None:
@@ -58,6 +87,9 @@ def _freeze(page: Sheet) -> None:
     for at, filled in page.columns.items():
         if filled.rules:
             page.columns[at] = replace(filled, kind="data", rules=())
+    head = page.cell_at(WORDS_ROW, 1)
+    page.cells[WORDS_ROW, 1] = head._replace(content=f"{head.content}. {NUMBERS_ONLY}")
+    page.widths[1], page.heights[WORDS_ROW] = 26, 60
 
 
 def _seal(page: Sheet) -> None:
@@ -77,14 +109,21 @@ def _veil(pages: dict[str, Sheet], layout: Layout, name: str) -> None:
         pages[sheet].columns[at] = replace(pages[sheet].columns[at], kind="veiled")
 
 
-def _mend_read_me(page: Sheet) -> None:
-    """The words about the sheet "Check", which handouts lack, become words about the questions."""
+def _mend_read_me(page: Sheet, exercise: Exercise) -> None:
+    """Words that ask to change what is locked, or tell of the sheet "Check", give way to others."""
     for (row, column), piece in list(page.cells.items()):
         if piece.content in LOCKED:
             page.put(row, column, LOCKED[piece.content], align="wrap")
-        if piece.content == "Check" and piece.kind == "index":
-            page.put(row, column, SHEET, "index")
-            page.put(row, column + 1, "what to fill in, and whether it looks right", align="wrap")
-        if piece.kind == "formula" and column == 1:
+        elif piece.kind == "formula" and column == 1:
             page.put(row + 1, 1, "answer", "sample")
             page.put(row + 1, 2, "an answer: fill in a formula", align="wrap")
+        elif piece.kind != "index":
+            continue
+        elif piece.content == "Parameters":
+            page.put(row, column + 1, OWN_PARAMETERS, align="wrap")
+        elif piece.content == "Check":
+            page.put(row, column, SHEET, "index")
+            page.put(row, column + 1, "what to fill in, and what looks right so far", align="wrap")
+        elif piece.content in exercise.frozen:
+            words = f"{page.cell_at(row, column + 1).content} (numbers only)".strip()
+            page.put(row, column + 1, words, align="wrap")

@@ -49,7 +49,7 @@ def solution_of_run(exercise: Exercise, now: Run) -> bytes:
 
 def handout_of_run(exercise: Exercise, now: Run, student: Student, secret: bytes) -> bytes:
     """The workbook of one run, to be handed out to a student."""
-    layout = Layout.standard(exercise.model)
+    layout = Layout.standard(exercise.model, exercise.waiting)
     read_me, *pages = with_empty_answers(exercise, layout, now)
     questions, salts = question_pages(exercise, layout, now, secret, (student.id, student.name))
     pages = [read_me, questions, *pages, salts]

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-from openpyxl.formatting.rule import CellIsRule
+from openpyxl.formatting.rule import FormulaRule
 from openpyxl.packaging.custom import StringProperty
-from openpyxl.styles import PatternFill, Protection
+from openpyxl.styles import Font, PatternFill, Protection
 from openpyxl.utils import get_column_letter
 from openpyxl.workbook import Workbook
 from openpyxl.worksheet.dimensions import ColumnDimension
 from openpyxl.worksheet.worksheet import Worksheet
 
 from kfsheet.coursework.handout import course_secret
-from kfsheet.coursework.handout.questions_sheet import FIRST, HIDDEN, LOOKS_RIGHT, SHEET, hide
+from kfsheet.coursework.handout.live_checks import HIDDEN
+from kfsheet.coursework.handout.questions_sheet import (
+    DIFFERS,
+    FEEDBACK_COLUMN,
+    FIRST,
+    LOOKS_RIGHT,
+    SHEET,
+    WAITS,
+    hide,
+)
 from kfsheet.model.exercise import Exercise
 from kfsheet.printing.excel_names import LAST_COLUMN
 from kfsheet.workbook.write.sheet import Sheet
@@ -26,14 +35,35 @@ def lock(
     # A second copy beside that on the hidden sheet: programs may lose the one or the other.
     token = course_secret.token(secret, exercise.name, student)
     book.custom_doc_props.append(StringProperty(name=TOKEN_PROPERTY, value=token))
-    fill = PatternFill("solid", start_color="FFC6EFCE", end_color="FFC6EFCE")
-    rule = CellIsRule(operator="equal", formula=[f'"{LOOKS_RIGHT}"'], fill=fill)
-    area = f"H{FIRST}:H{FIRST + len(exercise.questions) - 1}"
-    book[SHEET].conditional_formatting.add(area, rule)
+    _colour_feedback(book[SHEET], len(exercise.questions))
+    _hide_what_is_not_plotted(book["Charts"], pages)
     hide(book)
     for page in pages:
         _protect(book[page.title], page.width)
     book.active = book.sheetnames.index(SHEET)
+
+
+def _colour_feedback(sheet: Worksheet, questions: int) -> None:
+    """Green where all is right, paler where all is that can be, yellow where something is not."""
+    first = f"{FEEDBACK_COLUMN}{FIRST}"
+    colours = {
+        f'{first}="{LOOKS_RIGHT}"': "FFC6EFCE",
+        f'AND(LEFT({first},5)="right",ISNUMBER(SEARCH("{WAITS}",{first})))': "FFE2F5E4",
+        f'ISNUMBER(SEARCH("{DIFFERS}",{first}))': "FFFFEB9C",
+    }
+    area = f"{first}:{FEEDBACK_COLUMN}{FIRST + questions - 1}"
+    for test, colour in colours.items():
+        fill = PatternFill("solid", start_color=colour, end_color=colour)
+        sheet.conditional_formatting.add(area, FormulaRule(formula=[test], fill=fill))
+
+
+def _hide_what_is_not_plotted(sheet: Worksheet, pages: list[Sheet]) -> None:
+    """White text for #N/A in helper columns of the charts: a chart leaves nothing else out."""
+    page = next(page for page in pages if page.title == sheet.title)
+    for column, filled in page.columns.items():
+        first, letter = filled.rows[0], get_column_letter(column)
+        rule = FormulaRule(formula=[f"ISNA({letter}{first})"], font=Font(color="FFFFFFFF"))
+        sheet.conditional_formatting.add(f"{letter}{first}:{letter}{filled.rows[-1]}", rule)
 
 
 def _protect(sheet: Worksheet, width: int) -> None:

@@ -6,18 +6,23 @@ import re
 from collections.abc import Hashable
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Any
 
+from openpyxl.formula.tokenizer import TokenizerError
+from openpyxl.formula.translate import Translator, TranslatorError
 from openpyxl.utils import get_column_letter
 
 from kfsheet.coursework.judging.calculated_answers import Outcome
 from kfsheet.coursework.reading.cell_addresses import CellAddresses, find_sheet
 from kfsheet.coursework.reading.formula_text import parsed
 from kfsheet.coursework.reading.submission import Book
-from kfsheet.coursework.reading.worksheet import Content, Formula
 from kfsheet.errors import FormulaError
+from kfsheet.parsing.calculator import Content, Formula
 from kfsheet.parsing.references import Address, Cell, Reference
 
 DISTANCE = re.compile(r"\{[^{}]*\}")
+
+ALIKE = 2  # of a column that is filled down, a cell after those that begin it
 
 
 @dataclass(frozen=True)
@@ -36,6 +41,29 @@ class AnswerCell:
 def content_of(book: Book, cell: AnswerCell) -> Content | None:
     """What stands in the cell."""
     return book.sheets[cell.address[0]].get(cell.address[1:])
+
+
+def looked_at(book: Book, cells: list[AnswerCell], first: AnswerCell | None) -> dict[str, Any]:
+    """What a student is shown of an answer: the ``first`` cell that is not right, or any."""
+    cell = first or cells[min(ALIKE, len(cells) - 1)]
+    sheet, row, column = cell.address
+    place = f"{get_column_letter(column)}{row}"
+    content = content_of(book, cell)
+    if isinstance(content, Formula):
+        words = _as_in(content, place)
+    else:
+        words = "" if content is None else f"{content:.10g}" if type(content) is float else content
+    nowhere = first is None or content is None
+    return {"step": cell.step, "formula": words, "differs": "" if nowhere else f"{sheet}!{place}"}
+
+
+def _as_in(formula: Formula, place: str) -> str:
+    """A formula that is shared as its own cell shows it."""
+    host = f"{get_column_letter(formula.host[1])}{formula.host[0]}"
+    try:
+        return Translator(formula.text, host).translate_formula(place)
+    except (TranslatorError, TokenizerError):
+        return formula.text
 
 
 def not_in(book: Book, rest: list[AnswerCell], right: list[AnswerCell]) -> str:

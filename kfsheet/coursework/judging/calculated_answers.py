@@ -14,6 +14,7 @@ from typing import NamedTuple
 from kfsheet.coursework.judging.model_runs import World
 from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.coursework.reading.submission import Book
+from kfsheet.errors import KfsheetError
 from kfsheet.parsing.calculator import Error, Formula, SheetCalculator, TooMuchWorkError
 from kfsheet.parsing.references import Address, Cell
 
@@ -59,8 +60,10 @@ class CalculatedAnswers:
         """A new answer, with time of its own."""
         self.deadline = time.process_time() + SECONDS
 
-    def outcomes(self, name: str, step: int, address: Address) -> list[Outcome]:
-        """What the formula of one row gives in every world.
+    def outcomes(
+        self, name: str, step: int, address: Address, worlds: Sequence[World] | None = None
+    ) -> list[Outcome]:
+        """What the formula of one row gives in every world, or in some.
 
         Raises
         ------
@@ -69,7 +72,7 @@ class CalculatedAnswers:
         """
         if time.process_time() > self.deadline:
             raise TooMuchWorkError("calculating it takes too long")
-        return [self.outcome(world, name, step, address) for world in self.worlds]
+        return [self.outcome(world, name, step, address) for world in worlds or self.worlds]
 
     def outcome(
         self, world: World, name: str, step: int, address: Address, formula: Formula | None = None
@@ -86,13 +89,19 @@ class CalculatedAnswers:
         """
         cells = self._cells(self._own)
         spoilt = {name: _Spoilt(self._addresses, name, chosen, cells[name]) for name in cells}
-        found = self._base.with_values(spoilt).formula_value(address)
+        try:
+            found = self._base.with_values(spoilt).formula_value(address)
+        except KfsheetError:  # it goes another way, to what we cannot calculate
+            return True
         return not same(found, self._sheet(self._own).formula_value(address))
 
     def works(self, name: str, step: int, address: Address) -> bool:
         """Whether a cell, calculated in the student's own file, has the key's value."""
         wanted, size = self._own.cell(name, step), self._own.sizes.get(name, 0.0)
-        return same(self._base.value(address), wanted, size)
+        try:
+            return same(self._base.value(address), wanted, size)
+        except KfsheetError:  # another answer, that it reads, cannot be calculated
+            return False
 
     def _sheet(self, world: World) -> SheetCalculator:
         if world not in self._sheets:

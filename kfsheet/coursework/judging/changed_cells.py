@@ -10,10 +10,10 @@ from kfsheet.coursework.judging.model_runs import OwnNumbers
 from kfsheet.coursework.judging.original_workbook import original_workbook
 from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.coursework.reading.submission import Book
-from kfsheet.coursework.reading.worksheet import Content, Formula
 from kfsheet.errors import KfsheetError
 from kfsheet.model.exercise import Exercise, asked_steps
 from kfsheet.model.expressions import columns_read
+from kfsheet.parsing.calculator import Content, Formula
 from kfsheet.parsing.references import Address, relative_key
 
 WORLDS_CHECKED = 3  # with the student's own numbers, with and without observations
@@ -64,7 +64,7 @@ def _formulas(
     exercise: Exercise, book: Book, addresses: CellAddresses, calculated: CalculatedAnswers
 ) -> Iterator[str]:
     asked = {q.name for q in exercise.questions}
-    original = original_workbook(exercise.model)
+    original = original_workbook(exercise.model, exercise.waiting)
     unmoved = original.addresses.tables == addresses.tables
     unmoved &= original.addresses.scalars == addresses.scalars
     for column in exercise.model.table.values():

@@ -10,16 +10,21 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import inf
 
 from openpyxl.utils import FORMULAE
 
-from kfsheet.coursework.judging.answer_rows import AnswerCell, content_of, not_in, rows_of, shape
+from kfsheet.coursework.judging.answer_rows import (
+    AnswerCell,
+    content_of,
+    looked_at,
+    not_in,
+    rows_of,
+    shape,
+)
 from kfsheet.coursework.judging.calculated_answers import SECONDS, CalculatedAnswers
-from kfsheet.coursework.judging.dependencies import ancestors, delays
 from kfsheet.coursework.judging.mistakes.diagnosis import (
     EMPTY,
     GAPS,
@@ -37,16 +42,18 @@ from kfsheet.coursework.judging.mistakes.diagnosis import (
     digest_of,
 )
 from kfsheet.coursework.judging.mistakes.known_mistakes import KnownMistakes
-from kfsheet.coursework.judging.model_runs import ModelRuns, OwnNumbers
-from kfsheet.coursework.judging.precedents import circle_in_words, forbidden_precedent
+from kfsheet.coursework.judging.model_runs import ModelRuns, OwnNumbers, World
+from kfsheet.coursework.judging.own_work import OwnWork
+from kfsheet.coursework.judging.precedents import (
+    forbidden_precedent,
+)
 from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.coursework.reading.formula_text import forbidden
 from kfsheet.coursework.reading.submission import Book
-from kfsheet.coursework.reading.worksheet import Formula
 from kfsheet.coursework.time_limit import OutOfTimeError, time_limit
 from kfsheet.errors import ForbiddenError, KfsheetError
 from kfsheet.model.exercise import Question, asked_steps
-from kfsheet.parsing.calculator import TooMuchWorkError
+from kfsheet.parsing.calculator import Formula, TooMuchWorkError
 from kfsheet.parsing.references import relative_key
 
 CREDIT = {RIGHT: 1.0, HARD_CODED: 0.5, PARTLY: 0.5, GAPS: 0.5, NEARLY: 0.5}
@@ -56,6 +63,7 @@ FORMULA = "formula"  # a cell that is not judged yet
 UNKNOWN = re.compile(r"the function (\S+) is not known")
 GIVEN_UP = "given up: "
 FEW = 40  # rows of one formula that are all calculated; of more, those at which something changes
+OWN = 2  # worlds in which all rows are: the student's own numbers, and half of the observations
 
 
 @dataclass(frozen=True)
@@ -68,6 +76,14 @@ class Mark:
     status: str
     remark: str
     fingerprint: str = ""
+    step: int = 0
+    """The first step that is not right; of a right answer, one of those that are alike."""
+
+    formula: str = ""
+    """What stands in that step."""
+
+    differs: str = ""
+    """The cell of that step, if it is not right."""
 
 
 Recalculated = Callable[[CellAddresses, str], dict[int, bool]]
@@ -91,11 +107,19 @@ class Judge:
         self.addresses = CellAddresses.find(book, runs.model)
         worlds = (*runs.own_worlds(own), *runs.worlds)
         self.calculated = CalculatedAnswers(book, self.addresses, worlds)
+        self._own_work = OwnWork(runs, book, self.addresses, self.calculated)
         self._diagnosis = Diagnosis(book, self.addresses, self.calculated, runs, mistakes, own)
 
     def marks(self) -> list[Mark]:
         """One mark for each question."""
-        return [self._mark(asked) for asked in self._exercise.questions]
+        return [self._mark_or_reason(asked) for asked in self._exercise.questions]
+
+    def _mark_or_reason(self, asked: Question) -> Mark:
+        try:
+            return self._mark(asked)
+        except (Exception, OutOfTimeError) as error:  # a defect of ours costs one answer only
+            words = f"judging it failed ({type(error).__name__}: {error}); look at it by hand"
+            return Mark(asked.name, asked.points, 0.0, UNREADABLE, words)
 
     def _mark(self, asked: Question) -> Mark:
         cells = [self._found(asked.name, step) for step in asked_steps(self._model, asked.name)]
@@ -108,8 +132,9 @@ class Judge:
         # An engine calculates the whole workbook several times over: only where nothing else can.
         if any(_may_be_known(cell) for cell in cells):
             found = self._recalculated(self.addresses, asked.name)
-            cells = [_decided(cell, found) for cell in cells]
-        return self._marked(asked, cells)
+            cells = [self._decided(asked.name, cell, found) for cell in cells]
+        first = next((cell for cell in cells if cell.status != RIGHT), None)
+        return replace(self._marked(asked, cells), **looked_at(self.book, cells, first))
 
     def _found(self, name: str, step: int) -> AnswerCell | None:
         """What stands in a cell, by its kind."""
@@ -142,20 +167,32 @@ class Judge:
         """The cells of one formula, judged."""
         looked = self._looked_at(name, group)
         found = [self._calculate(name, cell) for cell in looked]
-        statuses = {cell.status for cell in found}
-        if len(looked) < len(group) and len(statuses) > 1:
-            known = {cell.step: cell for cell in found}
-            found = [known.get(c.step) or self._calculate(name, c) for c in group]
+        if len(looked) < len(group):
+            found = self._with_the_rest(name, group, found)
         if _only_gaps(found):
             found = [replace(cell, status=WRONG) for cell in found]
         right = [cell for cell in found if cell.status == RIGHT]
-        if right and (words := self._not_its_own(name, right)):
+        if right and (words := self._own_work.objection(name, right)):
             found = [replace(c, status=WRONG, words=words) if c in right else c for c in found]
         yield from found
         steps = {cell.step for cell in found}
         for cell in group:
             if cell.step not in steps:
                 yield replace(cell, status=found[0].status, words=found[0].words)
+
+    def _with_the_rest(
+        self, name: str, group: list[AnswerCell], found: list[AnswerCell]
+    ) -> list[AnswerCell]:
+        """Those of which some were found alike, and all others that may differ."""
+        known = {cell.step: cell for cell in found}
+        others = [cell for cell in group if cell.step not in known]
+        statuses = {cell.status for cell in found}
+        if statuses == {RIGHT}:  # every row as the student sees it, with and without observations
+            own = self.calculated.worlds[:OWN]
+            others = [c for c in others if self._calculate(name, c, own).status != RIGHT]
+        elif len(statuses) == 1:
+            others = []
+        return found + [self._calculate(name, cell) for cell in others]
 
     def _looked_at(self, name: str, group: list[AnswerCell]) -> list[AnswerCell]:
         if len(group) <= FEW:
@@ -167,10 +204,12 @@ class Judge:
         at |= {n + more for n in changes for more in (0, 1)}
         return [group[n] for n in sorted(at)]
 
-    def _calculate(self, name: str, cell: AnswerCell) -> AnswerCell:
+    def _calculate(
+        self, name: str, cell: AnswerCell, worlds: Sequence[World] | None = None
+    ) -> AnswerCell:
         try:
             with time_limit(SECONDS):
-                outcomes = tuple(self.calculated.outcomes(name, cell.step, cell.address))
+                outcomes = tuple(self.calculated.outcomes(name, cell.step, cell.address, worlds))
         except OutOfTimeError:
             return replace(cell, status=UNREADABLE, words=f"{GIVEN_UP}calculating takes too long")
         except ForbiddenError as error:
@@ -190,40 +229,15 @@ class Judge:
         words = forbidden_precedent(self.book, self.addresses, cell.address)
         return f"{words} is not allowed" if words else ""
 
-    def _not_its_own(self, name: str, right: list[AnswerCell]) -> str:
-        """Words, if an answer with the right values is computed from itself, or copied."""
-        try:
-            for cell in {right[0].step: right[0], right[-1].step: right[-1]}.values():
-                if words := self._circle(name, cell):
-                    return words
-            return self._repeats(name, right[0])
-        except KfsheetError:
-            return ""
-
-    def _circle(self, name: str, cell: AnswerCell) -> str:
-        after = delays(self._model, name)
-
-        def follows(other: str, step: int) -> bool:
-            return step - cell.step >= after.get(other, inf)
-
-        if not self.calculated.needs(follows, cell.address):
-            return ""
-        # Who reads the analysis for the innovation may have written the analysis without it.
-        if self.calculated.works(name, cell.step, cell.address):
-            return ""
-        return (
-            circle_in_words(self.book, cell.address)
-            or "it goes in a circle: it needs its own result"
-        )
-
-    def _repeats(self, name: str, cell: AnswerCell) -> str:
-        """Words, if the answer is copied from a column that hides its formula."""
-        for veiled in self._exercise.veiled:
-            if veiled in ancestors(self._model, name):
-                continue
-            if self.calculated.needs(lambda other, _, v=veiled: other == v, cell.address):
-                return f"{veiled} repeats the answer; derive it"
-        return ""
+    def _decided(self, name: str, cell: AnswerCell, found: dict[int, bool]) -> AnswerCell:
+        """A cell that an engine has judged where we could not."""
+        if cell.status != UNREADABLE or cell.step not in found:
+            return cell
+        if not found[cell.step]:
+            words = f"recalculated, since {cell.words}: other values than the key"
+            return replace(cell, status=WRONG, words=words)
+        words = self._own_work.objection_by_text(name, cell)
+        return replace(cell, status=WRONG if words else RIGHT, words=words)
 
     # -- from cells to a mark --------------------------------------------------------------
 
@@ -304,15 +318,6 @@ def _may_be_known(cell: AnswerCell) -> bool:
     unknown = UNKNOWN.search(cell.words)
     known = not unknown or unknown[1] in FORMULAE
     return cell.status == UNREADABLE and known and not cell.words.startswith(GIVEN_UP)
-
-
-def _decided(cell: AnswerCell, found: dict[int, bool]) -> AnswerCell:
-    if cell.status != UNREADABLE or cell.step not in found:
-        return cell
-    if found[cell.step]:
-        return replace(cell, status=RIGHT, words="")
-    words = f"recalculated, since {cell.words}: other values than the key"
-    return replace(cell, status=WRONG, words=words)
 
 
 def _numbers_in_disguise(rest: list[AnswerCell]) -> bool:

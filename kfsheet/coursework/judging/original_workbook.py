@@ -9,8 +9,8 @@ from openpyxl.utils import get_column_letter
 
 from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.coursework.reading.submission import Book
-from kfsheet.coursework.reading.worksheet import Content, Formula
 from kfsheet.model.recurrence import Recurrence
+from kfsheet.parsing.calculator import Content, Formula
 from kfsheet.parsing.references import Address
 from kfsheet.workbook.write.exercise_sheets import section_sheet
 from kfsheet.workbook.write.layout import Layout
@@ -27,9 +27,9 @@ class OriginalWorkbook(NamedTuple):
 
 
 @lru_cache(maxsize=8)
-def original_workbook(model: Recurrence) -> OriginalWorkbook:
-    """The workbook of a model, made once."""
-    layout = Layout.standard(model)
+def original_workbook(model: Recurrence, waiting: frozenset[str] = frozenset()) -> OriginalWorkbook:
+    """The workbook of a model, made once; what waits for an answer is guarded, as in handouts."""
+    layout = Layout.standard(model, waiting)
     book, now = Book(""), Run.of(model)
     for page in (section_sheet(layout, section, now) for section in model.sections):
         book.sheets[page.title] = {

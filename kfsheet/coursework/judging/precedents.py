@@ -9,8 +9,8 @@ from openpyxl.utils import get_column_letter
 from kfsheet.coursework.reading.cell_addresses import CellAddresses, find_sheet, named_cell
 from kfsheet.coursework.reading.formula_text import forbidden, parsed
 from kfsheet.coursework.reading.submission import Book
-from kfsheet.coursework.reading.worksheet import Formula
 from kfsheet.errors import FormulaError
+from kfsheet.parsing.calculator import Formula
 from kfsheet.parsing.references import Address
 
 MOST = 2_000  # cells that are looked at
@@ -71,6 +71,15 @@ def own_cells(book: Book, addresses: CellAddresses, start: Address) -> Iterator[
             if other not in seen and not addresses.role(other):
                 seen.add(other)
                 waiting.append(other)
+
+
+def quantities_named(
+    book: Book, addresses: CellAddresses, start: Address
+) -> Iterator[tuple[str, int]]:
+    """Columns, with their steps, and scalars to which a formula and its helper cells refer."""
+    for cell in own_cells(book, addresses, start):
+        for role in filter(None, map(addresses.role, precedents(book, cell))):
+            yield (role, 0) if isinstance(role, str) else role
 
 
 def forbidden_precedent(book: Book, addresses: CellAddresses, start: Address) -> str:

@@ -10,21 +10,28 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from functools import cached_property
 from pathlib import Path
 
 from kfsheet.coursework.judging.calculated_answers import Cells, filled, same
 from kfsheet.coursework.judging.model_runs import ModelRuns, World
 from kfsheet.coursework.judging.recalculation_process import calculated
 from kfsheet.coursework.reading.cell_addresses import CellAddresses
-from kfsheet.errors import KfsheetError
+from kfsheet.coursework.reading.submission import read_submission
+from kfsheet.errors import FormulaError, KfsheetError
 from kfsheet.model.exercise import asked_steps
-from kfsheet.parsing.references import Address
+from kfsheet.parsing.calculator import Content, Formula
+from kfsheet.parsing.references import Address, Cell
+from kfsheet.parsing.syntax import parse_formula
 from kfsheet.workbook.engines.libreoffice import libreoffice
 from kfsheet.workbook.engines.spreadsheet_engine import CellValue, Changes
 
 WORLDS = {"ironcalc": 7, "libreoffice": 3}  # of those of all students; LibreOffice is slow
 TOLERANCE = 1e-8  # rows that build upon each other pass their rounding on
 SECONDS = 60.0  # of the engines' time for one workbook, all answers together
+WORK = 2.0  # seconds of computing for one answer, beyond what its workbook takes without it
+STARTS = {"ironcalc": 1.0, "libreoffice": 8.0}  # such seconds until an engine has begun
+CELLS = {"ironcalc": 60_000, "libreoffice": 20_000}  # of the model, loaded or calculated in one
 
 
 class Recalculation:
@@ -38,11 +45,27 @@ class Recalculation:
     def __call__(self, addresses: CellAddresses, name: str) -> dict[int, bool]:
         """Whether a step of an answer has the key's value in every world, where one can tell."""
         cells = {step: addresses.of(name, step) for step in asked_steps(self._runs.model, name)}
+        # What is no formula is no riddle: LibreOffice would mend what Excel refuses.
+        cells = {step: cell for step, cell in cells.items() if self._may_be_read(cell)}
         found: dict[int, bool] = {}
         for engine in WORLDS if libreoffice() else ("ironcalc",):
             if open_steps := {step: cell for step, cell in cells.items() if step not in found}:
                 found |= self._asked(engine, addresses, name, open_steps)
         return found
+
+    @cached_property
+    def _sheets(self) -> dict[str, dict[Cell, Content]]:
+        return read_submission(self._path).sheets
+
+    def _may_be_read(self, cell: Address) -> bool:
+        """Whether a formula can be read, by whoever knows its functions."""
+        content = self._sheets.get(cell[0], {}).get(cell[1:])
+        if not isinstance(content, Formula):  # one of an array's cells
+            return True
+        try:
+            return bool(parse_formula(content.text))
+        except FormulaError:
+            return False
 
     def _asked(
         self, engine: str, addresses: CellAddresses, name: str, cells: dict[int, Address]
@@ -52,7 +75,8 @@ class Recalculation:
         wanted = [filled(world, addresses) for world in worlds]
         trials = [_changes(values, set(cells.values())) for values in wanted]
         try:
-            values = calculated(self._path, trials, list(cells.values()), self._left, engine)
+            work = _work(engine, wanted)
+            values = calculated(self._path, trials, [*cells.values()], self._left, engine, work)
         except KfsheetError:
             self.late |= time.monotonic() - began >= self._left
             return {}
@@ -64,6 +88,12 @@ class Recalculation:
             for (step, cell), seen in pairs
         }
         return {step: right for step, right in told.items() if right is not None}
+
+
+def _work(engine: str, wanted: Sequence[Cells]) -> float:
+    """Seconds of computing that an engine may take: what it loads and calculates, and WORK."""
+    cells = sum(len(cells) for cells in wanted[0].values()) if wanted else 0
+    return STARTS[engine] + WORK + (1 + len(wanted)) * cells / CELLS[engine]
 
 
 def _of(cell: Address, values: Cells) -> CellValue:

@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from kfsheet.coursework.reading.submission import Book
-from kfsheet.coursework.reading.worksheet import Content
 from kfsheet.errors import FormulaError
 from kfsheet.model.recurrence import Recurrence
+from kfsheet.parsing.calculator import Content
 from kfsheet.parsing.references import Address, Cell, read_reference
 
 Rows = dict[int, dict[str, int]]

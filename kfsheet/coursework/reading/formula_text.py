@@ -6,7 +6,7 @@ import re
 from functools import lru_cache
 from typing import NamedTuple
 
-from kfsheet.coursework.reading.worksheet import Formula
+from kfsheet.parsing.calculator import Formula
 from kfsheet.parsing.formula import parse_formula, references, relative_tree
 from kfsheet.parsing.references import Reference, relative_key
 from kfsheet.parsing.syntax import Tree

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import unicodedata
 from collections.abc import Iterator, Sequence
@@ -34,6 +35,16 @@ def passed_over(folder: str | Path, without: Path | None = None) -> list[Path]:
         If there is no such folder.
     """
     return sorted(path for path, taken in _walk(_folder(folder), without) if not taken)
+
+
+def readable(name: str) -> str:
+    r"""A file name as it can be shown and stored: any bytes may stand in one.
+
+    >>> readable("a\nb"), readable(os.fsdecode(b"\xe9t\xe9.xlsx"))
+    ('a\\nb', '\\xe9t\\xe9.xlsx')
+    """
+    text = os.fsencode(name).decode(errors="backslashreplace")
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def _folder(folder: str | Path) -> Path:

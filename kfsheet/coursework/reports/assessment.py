@@ -2,7 +2,7 @@
 
 =========  =====================================================================================
 file       :mod:`kfsheet.coursework.reading.submission` reads it within limits
-cells      :mod:`kfsheet.coursework.reading.worksheet` keeps formulas, numbers and texts
+cells      :mod:`kfsheet.workbook.reading.sheet_cells` keeps formulas, numbers and texts
 answers    :mod:`kfsheet.coursework.reading.cell_addresses` finds where they stand
 values     :mod:`kfsheet.coursework.judging.calculated_answers` calculates each in several worlds
 mark       :mod:`kfsheet.coursework.judging.judge` compares them with the key's
@@ -33,13 +33,15 @@ from kfsheet.coursework.judging.recalculated_answers import Recalculation
 from kfsheet.coursework.reading.cell_addresses import named_cell
 from kfsheet.coursework.reading.submission import Book, read_submission
 from kfsheet.coursework.reports.marked_workbook import mark_workbook
-from kfsheet.errors import KfsheetError, SubmissionError
+from kfsheet.coursework.reports.origin import Numbers, strange_numbers
+from kfsheet.errors import KfsheetError, SubmissionError, UnwrittenError
 from kfsheet.exercises import load_exercise
 from kfsheet.files import write_file
 from kfsheet.model.exercise import Exercise
 from kfsheet.workbook.write.layout import TOKEN_NAME
 
 GRADED, UNTOUCHED, NO_TOKEN, OTHER = "graded", "untouched", "no token", "other exercise"
+NOT_OWN = "not own data"
 
 
 @dataclass
@@ -54,7 +56,13 @@ class Assessment:
     """Whether a marked copy of the workbook could be made."""
 
     final: bool = True
-    """Whether it would be the same on a machine that has more time."""
+    """Whether it would be the same on a machine that has more time and room."""
+
+    numbers: Numbers = field(default_factory=dict)
+    """Those of the file, if they are not the student's own."""
+
+    unwritten: str = ""
+    """What could not be written for lack of room, if anything."""
 
     @property
     def score(self) -> float:
@@ -100,12 +108,17 @@ def assess(spec: str, secret: bytes, path: Path, copy: Path | None = None) -> As
         own = own_numbers(exercise, secret, student)
         recalculation = Recalculation(path, runs)
         judge = Judge(runs, mistakes, book, own, recalculation)
+        if numbers := strange_numbers(exercise, book, judge.addresses, own):
+            words = "parameters and data are not those that this student was given"
+            return Assessment(NOT_OWN, words, student, numbers=numbers)
         marks = judge.marks()
         if all(mark.status == EMPTY for mark in marks):
             return Assessment(UNTOUCHED, "no answer was filled in", student, marks)
         remarks = "; ".join(_remarks(exercise, judge, own, recalculation.late))
-        feedback = bool(copy) and _write_copy(path, copy, judge, marks)
-        return Assessment(GRADED, remarks, student, marks, feedback, final=not recalculation.late)
+        found = Assessment(GRADED, remarks, student, marks, final=not recalculation.late)
+        if copy:
+            _write_copy(found, path, copy, judge)
+        return found
     except SubmissionError as error:
         return Assessment(error.status, error.remark)
     except MemoryError:  # the limit of the process, see worker_pool
@@ -143,10 +156,13 @@ def _remarks(exercise: Exercise, judge: Judge, own: OwnNumbers, late: bool) -> I
         yield "there was no time to calculate all answers; grade again to try once more"
 
 
-def _write_copy(path: Path, copy: Path, judge: Judge, marks: list[Mark]) -> bool:
+def _write_copy(found: Assessment, path: Path, copy: Path, judge: Judge) -> None:
     """The student's own workbook with marks; a file too odd for that goes without."""
     try:
-        write_file(copy, mark_workbook(path, judge.book, judge.addresses, marks))
+        write_file(copy, mark_workbook(path, judge.book, judge.addresses, found.marks))
+    except UnwrittenError as error:  # the next run tries again
+        found.unwritten, found.final = str(error), False
     except (KfsheetError, ValueError, KeyError):
-        return False
-    return True
+        return
+    else:
+        found.feedback = True

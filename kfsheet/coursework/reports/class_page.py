@@ -6,6 +6,8 @@ from collections import Counter, defaultdict
 from html import escape
 
 from kfsheet.coursework.judging.mistakes.diagnosis import RIGHT
+from kfsheet.coursework.reading.submitted_files import readable
+from kfsheet.coursework.reports.assessment import NOT_OWN
 from kfsheet.coursework.reports.class_charts import (
     answers_by_status,
     distribution,
@@ -31,7 +33,7 @@ def class_page(exercise: Exercise, results: list[Result], handed: list[Handed]) 
     body += _mistakes(exercise, judged)
     body += "<h2>Most frequent mistakes</h2>" + frequent_mistakes(judged)
     body += "<h2>Identical wrong answers</h2>" + _groups(judged)
-    body += "<h2>Files that carry somebody else's token</h2>" + _foreign(results, handed)
+    body += "<h2>Files that carry somebody else's token or numbers</h2>" + _foreign(results, handed)
     body += "<h2>Files that belong to nobody</h2>" + _lost(handed)
     return page(f"{exercise.title}: the class", body)
 
@@ -66,18 +68,35 @@ def _groups(judged: list[Result]) -> str:
 def _foreign(results: list[Result], handed: list[Handed]) -> str:
     names = {r.student.id for r in results}
     rows = [
-        ("", (h.path.name, h.owner.id if h.owner else "", h.assessment.student))
+        (
+            "",
+            (
+                readable(h.path.name),
+                h.owner.id if h.owner else "",
+                h.assessment.student,
+                _numbers_of(h),
+            ),
+        )
         for h in handed
         if h.assessment.student
-        and (h.assessment.student not in names or (h.owner and h.owner.id != h.assessment.student))
+        and (
+            h.assessment.student not in names
+            or (h.owner and h.owner.id != h.assessment.student)
+            or h.assessment.status == NOT_OWN
+        )
     ]
-    head = ("file", "came from", "token of")
+    head = ("file", "came from", "token of", "numbers of")
     return table(head, rows) if rows else "<p>none</p>"
+
+
+def _numbers_of(file: Handed) -> str:
+    """Whose numbers a file holds, where it is not a student's own."""
+    return (file.numbers_of or "nobody") if file.assessment.status == NOT_OWN else ""
 
 
 def _lost(handed: list[Handed]) -> str:
     rows = [
-        ("", (h.path.name, h.assessment.status, h.assessment.remark, OF_NOBODY))
+        ("", (readable(h.path.name), h.assessment.status, h.assessment.remark, OF_NOBODY))
         for h in handed
         if h.of_nobody
     ]

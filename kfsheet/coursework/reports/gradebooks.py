@@ -48,7 +48,8 @@ def _grades(exercise: Exercise, results: list[Result]) -> str:
     for r in results:
         scores = {m.name: points_shown(m.score) for m in r.marks}
         who = [r.student.id, r.student.name, points_shown(r.score), r.maximum, _percent(r)]
-        lines.append([*who, *(scores.get(n, 0) for n in names), r.status, r.remark])
+        remark = "; ".join(filter(None, (r.remark, r.note)))
+        lines.append([*who, *(scores.get(n, 0) for n in names), r.status, remark])
     return _table(head, lines)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor
@@ -15,9 +16,18 @@ from kfsheet import __version__
 from kfsheet.coursework.handout import course_secret
 from kfsheet.coursework.judging.judge import Mark
 from kfsheet.coursework.reading.roster import Student
-from kfsheet.coursework.reading.submitted_files import owner, submitted_files
-from kfsheet.coursework.reports.assessment import GRADED, NO_TOKEN, OTHER, Assessment, assess
+from kfsheet.coursework.reading.submitted_files import owner, readable, submitted_files
+from kfsheet.coursework.reports.assessment import (
+    GRADED,
+    NO_TOKEN,
+    NOT_OWN,
+    OTHER,
+    Assessment,
+    assess,
+)
+from kfsheet.coursework.reports.origin import holder
 from kfsheet.coursework.worker_pool import SECONDS, Failed, Pool, run_on
+from kfsheet.errors import UnwrittenError
 from kfsheet.files import write_file
 from kfsheet.model.exercise import Exercise
 
@@ -30,6 +40,8 @@ STATUSES = {
     FOREIGN: "the file was handed out to another student; it does not count",
     NO_TOKEN: "the file was not handed out to anybody, or its token was removed",
     OTHER: "the file belongs to another exercise",
+    NOT_OWN: "the file holds other numbers than those handed out to this student; it does not "
+    "count",
     "empty file": "the file has 0 bytes",
     "wrong kind": "the file is no .xlsx workbook, whatever its name says",
     "damaged": "the workbook cannot be opened",
@@ -59,6 +71,9 @@ class Result:
     changed: bool = False
     """Whether a lecturer has changed a mark."""
 
+    note: str = ""
+    """For the lecturer only."""
+
     @property
     def score(self) -> float:
         """Points, a lecturer's own total included."""
@@ -73,6 +88,8 @@ class Handed:
     owner: Student | None
     key: str
     assessment: Assessment
+    numbers_of: str = ""
+    """Whose numbers the file holds, if not those of whose token it carries."""
 
     @property
     def of_nobody(self) -> bool:
@@ -136,12 +153,24 @@ def grade(
 
     judged = _judged(keys, spec, secret, out / "work", run, progress)
     by_id = {student.id: student for student in students}
-    handed = [
-        Handed(path, owner(path, folder, students, by_id.get(found.student)), keys[path], found)
-        for path, found in ((path, judged[keys[path]]) for path in files)
-    ]
+    origin = _origins(exercise, secret, students, judged)
+    handed = []
+    for path in files:
+        found = judged[keys[path]]
+        whose = owner(path, folder, students, by_id.get(found.student))
+        handed.append(Handed(path, whose, keys[path], found, origin.get(keys[path], "")))
     maximum = sum(question.points for question in exercise.questions)
     return [_result(student, handed, maximum) for student in students], handed
+
+
+def _origins(
+    exercise: Exercise, secret: bytes, students: Sequence[Student], judged: dict[str, Assessment]
+) -> dict[str, str]:
+    """Who was given the numbers of files that are not their students' own."""
+    strange = {key: found for key, found in judged.items() if found.status == NOT_OWN}
+    return {
+        key: holder(found.numbers, exercise, secret, students) for key, found in strange.items()
+    }
 
 
 def _key(path: Path, version: str, secret: bytes) -> str:
@@ -152,7 +181,7 @@ def _key(path: Path, version: str, secret: bytes) -> str:
             for block in iter(lambda: file.read(2**20), b""):
                 content.update(block)
     except OSError:
-        content.update(str(path).encode())
+        content.update(os.fsencode(path))
     parts = ("key", version, __version__, content.hexdigest())
     return course_secret.digest(secret, *parts).hex()[:32]
 
@@ -182,17 +211,24 @@ def _judged(
     for path, found in progress(judged, len(tasks)):
         known[names[path]] = found
         if found.final:  # else the machine was busy, and the next run tries again
-            content = json.dumps(found.as_dict()).encode()
-            write_file(work / f"{names[path]}.json", content)
+            _keep(found, work / f"{names[path]}.json")
     return known
 
 
-def _kept(work: Path, key: str) -> Assessment | None:
-    """The result of an earlier run; one that was damaged is made anew."""
+def _keep(found: Assessment, path: Path) -> None:
     try:
-        return Assessment.from_dict(json.loads((work / f"{key}.json").read_text()))
+        write_file(path, json.dumps(found.as_dict()).encode())
+    except UnwrittenError as error:  # it is judged again in the next run
+        found.unwritten = str(error)
+
+
+def _kept(work: Path, key: str) -> Assessment | None:
+    """The result of an earlier run; one that was damaged, or lost its copy, is made anew."""
+    try:
+        found = Assessment.from_dict(json.loads((work / f"{key}.json").read_text()))
     except (OSError, ValueError, TypeError, KeyError):
         return None
+    return found if (work / f"{key}.xlsx").is_file() or not found.feedback else None
 
 
 def _assessment(found: Assessment | Failed) -> Assessment:
@@ -218,8 +254,14 @@ def _result(student: Student, handed: list[Handed], maximum: int) -> Result:
     remark = "; ".join([found.remark, *others] if found.remark else others)
     return Result(
         student, maximum, found.status, remark, found.marks, chosen.path, chosen.key,
-        found.feedback,
+        found.feedback, note=_note(chosen),
     )  # fmt: skip
+
+
+def _note(chosen: Handed) -> str:
+    if chosen.assessment.status != NOT_OWN:
+        return ""
+    return f"the numbers are those of {chosen.numbers_of or 'nobody on the roster'}"
 
 
 def _others(student: Student, chosen: Handed, files: list[Handed]) -> list[str]:
@@ -230,7 +272,8 @@ def _others(student: Student, chosen: Handed, files: list[Handed]) -> list[str]:
     named = Counter(h.path.name for h in files)
 
     def name(file: Handed) -> str:
-        return "/".join(file.path.parts[-2 if named[file.path.name] > 1 else -1 :])
+        parts = file.path.parts[-2 if named[file.path.name] > 1 else -1 :]
+        return "/".join(map(readable, parts))
 
     def shown(file: Handed) -> str:
         found = file.assessment

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from kfsheet.coursework.judging.judge import Mark
-from kfsheet.coursework.reading.roster import has_text, records
+from kfsheet.coursework.reading.roster import records, visible
 from kfsheet.coursework.reports.grading import Result
 from kfsheet.errors import DataError
 from kfsheet.files import write_file
@@ -27,20 +27,15 @@ def read_overrides(path: Path, exercise: Exercise, ids: set[str]) -> list[dict[s
     if not path.exists():
         write_file(path, HEAD.encode())
         return []
-    try:
-        text = path.read_bytes().decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise DataError(f"{path} is not UTF-8; save it as CSV UTF-8") from None
-    lines = records(text)
+    content = path.read_bytes()
     return [
-        _checked(line, f"{path}, line {lines.line_num}", exercise, ids)
-        for line in lines
-        if any(map(has_text, line.values()))
+        _checked(line, f"{path}, line {number}", exercise, ids)
+        for number, line in records(content, str(path), HEAD.strip().split(",")[:3])
     ]
 
 
 def _checked(line: dict[str, str], where: str, exercise: Exercise, ids: set[str]) -> dict[str, Any]:
-    values = {key: (line.get(key) or "").strip() for key in ("id", "question", "score", "remark")}
+    values = {key: visible(line.get(key) or "") for key in ("id", "question", "score", "remark")}
     if values["id"] not in ids:
         raise DataError(f"{where}: {values['id']!r} is not on the roster")
     if values["question"] not in {"", *(q.name for q in exercise.questions)}:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from kfsheet.model.exercise import Question
 
 ABOUT = (
-    "A ball is fired at 915 m/s and 45 degrees. A radar 30 km downrange measures its angle "
-    "(error 0.01 rad) and its range (error 30.48 m) ten times a second. There is no drag; the "
-    "filters know gravity, but start with positions and velocities that are wrong.",
+    "A ball is fired at {v_0} m/s and {angle} degrees. A radar {x_R} m downrange measures its "
+    "angle (error {sigma_theta} rad) and its range (error {sigma_r} m) ten times a second. There "
+    "is no drag; the filters know gravity, but start with positions and velocities that are wrong.",
     "Two filters see the same radar. The extended Kalman filter (sheet EKF) takes angle and range "
     "as they are and linearises them at each forecast: the columns H_. The linear filter (sheet "
     "Linear) is given positions computed from angle and range, one axis at a time.",

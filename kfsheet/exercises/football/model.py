@@ -314,8 +314,6 @@ exercise = Exercise(
         "b_z": (0.006, 0.02),
     },
     frozen=("Free run",),
-    # u and w of the next step, and what holds the denominator of the gains.
-    veiled=("u_next", "w_next", "sigma_d_i", "sigma_d_j", "p_x", "p_z"),
     draw=draw_kick,
     ranges={"i": (0, 2000), "j": (0, 2000)},  # pixels of a photo
 )

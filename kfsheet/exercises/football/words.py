@@ -5,9 +5,10 @@ from __future__ import annotations
 from kfsheet.model.exercise import Question
 
 ABOUT = (
-    "A football is kicked from 23.4 m towards the goal line at x = 0 and photographed ten times a "
-    "second. Each photo gives two pixels, with an error of 3 pixels; a simple model of the flight "
-    "gives a forecast, with an error of 0.1 m. The filter weighs one against the other.",
+    "A football is kicked from {x_0} m towards the goal line at x = 0 and photographed ten times a "
+    "second. Each photo gives two pixels, with errors of variance {r_i} px2; a simple model of the "
+    "flight gives a forecast, with errors of variance {b_x} m2 in x and {b_z} m2 in z. The filter "
+    "weighs one against the other.",
     "Try this: on the sheet Parameters, change r_i and r_j from 9 to 900 (a camera with an error "
     "of 30 pixels instead of 3). The gains K_x and K_z fall, and the analysis leans on the model. "
     "Then look at the innovations on the sheet Charts: they should scatter about zero, within two "

@@ -25,7 +25,7 @@ from kfsheet.exercises.shuttlecock.forecasts import (
     add_regressors,
     add_theory,
 )
-from kfsheet.exercises.shuttlecock.words import ABOUT, QUESTIONS, SECTIONS, TASK, TWINS
+from kfsheet.exercises.shuttlecock.words import ABOUT, QUESTIONS, SECTIONS, TASK
 from kfsheet.model.exercise import Exercise
 from kfsheet.model.expressions import RMS, Last, Mean, t
 from kfsheet.model.recurrence import Recurrence
@@ -159,5 +159,5 @@ exercise = Exercise(
     vary={"v_x": (1.2, 1.8), "v_y": (0.6, 1.0), "v_z": (3.7, 4.2), "k_m": (0.85, 1.15)},
     noise=("n_x", "n_y", "n_z"),
     frozen=("Truth", "Fit filtered", "Latest state", "Exact filter"),
-    veiled=TWINS,
+    veiled=("y_fall_raw",),  # of its line X at the fall can be told, which x_fall_raw is about
 )

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from kfsheet.exercises.shuttlecock.forecasts import NEWTON_STEPS
 from kfsheet.model.exercise import Question
 
 ABOUT = (
-    "A robot is to kick a shuttlecock back. Two cameras see it 30 times a second with errors of 6 "
-    "to 17 cm; the robot needs the place and the moment of the fall, and early. The source of this "
-    "exercise filters the positions, then fits the track to them, and claims that the fall point "
-    "settles faster and better than without the filter.",
+    "A robot is to kick a shuttlecock back. Two cameras see it {fps} times a second, with errors "
+    "whose power is 1/{SNR} of the signal's; the robot needs the place and the moment of the fall, "
+    "and early. The source of this exercise filters the positions, then fits the track to them, "
+    "and claims that the fall point settles faster and better than without the filter.",
     "Look at both fits on the sheet Charts: 'Fit raw' takes the positions as the cameras saw them, "
     "'Fit filtered' as the filter of the sheet Kalman corrected them. The filter's positions are "
     "indeed better than the cameras'. Are its fall points?",
@@ -78,14 +77,4 @@ TASK = (
     "to W_4_raw are a step of Newton's method each, and W_4_raw counts as W. x_fall_raw is where "
     "the track then is. A track that stays below z_fall has no first guess, and then the rest of "
     "the row has no value either.",
-)
-ASKED_OF_Z = (
-    *("z_f", "vz_f", "az_f", "d_z", "S_z", "K_z_z", "K_vz_z", "z_a", "P_zz_a"),
-    *("p_z_raw", "v_z_raw"),
-)
-# What is asked of z stands beside it for x and y, and one step of Newton's is like another.
-TWINS = (
-    *(name.replace("z", axis) for axis in "xy" for name in ASKED_OF_Z),
-    "y_fall_raw",
-    *(f"W_{n}_raw" for n in range(2, NEWTON_STEPS + 1)),
 )

@@ -6,8 +6,8 @@ from kfsheet.model.exercise import Question
 
 ABOUT = (
     "A tennis ball flies away from camera 1, which takes 101 images of it in a second. Camera 2 at "
-    "the side has it in images 5 to 12 only. Each pixel errs by 0.2 px. Where is the ball in the "
-    "other images, and where will it come down?",
+    "the side has it in images 5 to 12 only. Each pixel errs by {sigma_px} px. Where is the ball "
+    "in the other images, and where will it come down?",
     "Triangulation needs both cameras. The filter (sheet Kalman filter) takes every pixel by "
     "itself, and carries position and velocity by the equation of the flight with drag and spin. "
     "The sheet Flight goes on to the ground; if h_fly is too short for it, landed is 0 and red.",

@@ -1,5 +1,6 @@
 """A spreadsheet calculator: syntax trees evaluated by the spreadsheet's own rules.
 
+Here belong operators, functions, references and what a whole workbook makes of them.
 Errors, empty cells, texts that hold numbers and arrays are values here, and nothing is simplified:
 ``SQRT(x)^2`` of a negative number is #NUM!. Nothing here may open a file or know what a formula is
 for. Begin with :func:`program` for one formula and :class:`SheetCalculator` for a whole workbook.

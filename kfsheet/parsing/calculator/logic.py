@@ -22,6 +22,7 @@ from kfsheet.parsing.calculator.values import (
     Lambda,
     Program,
     Scalar,
+    TooMuchWorkError,
     UnsupportedError,
     Value,
     cells_of,
@@ -215,6 +216,8 @@ def called(c: Context, function: Value, arguments: Sequence[Value]) -> Value:
     c.variables = {**function.variables, **given}
     try:
         return function.body(c)
+    except RecursionError:  # it calls itself without an end
+        raise TooMuchWorkError("the formula is nested too deep") from None
     finally:
         c.variables = outside
 

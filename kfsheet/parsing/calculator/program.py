@@ -19,7 +19,15 @@ from functools import lru_cache, partial
 from openpyxl.utils import column_index_from_string
 
 from kfsheet.errors import ForbiddenError
-from kfsheet.parsing.calculator import logic, lookups, mathematics, statistics, words
+from kfsheet.parsing.calculator import (
+    averages,
+    criteria,
+    line_fits,
+    logic,
+    lookups,
+    mathematics,
+    words,
+)
 from kfsheet.parsing.calculator.broadcasting import broadcast, intersect, lifted
 from kfsheet.parsing.calculator.values import (
     EMPTY,
@@ -47,7 +55,9 @@ from kfsheet.printing.excel_names import LAST_COLUMN, LAST_ROW
 Tree = tuple
 FUNCTIONS = (
     mathematics.FUNCTIONS
-    | statistics.FUNCTIONS
+    | averages.FUNCTIONS
+    | line_fits.FUNCTIONS
+    | criteria.FUNCTIONS
     | logic.FUNCTIONS
     | lookups.FUNCTIONS
     | words.FUNCTIONS

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, NamedTuple
 
-from kfsheet.errors import FormulaError
+from kfsheet.errors import FormulaError, TooMuchWorkError
 from kfsheet.parsing.calculator.arithmetic import DOUBLES, Arithmetic
 
 EMPTY = None
@@ -80,10 +80,6 @@ Value = Any
 
 class UnsupportedError(FormulaError):
     """Our calculator cannot tell what a formula is worth; another reader may."""
-
-
-class TooMuchWorkError(FormulaError):
-    """A formula takes more operations than it was given."""
 
 
 class FailedError(Exception):

@@ -16,7 +16,7 @@ from kfsheet.parsing.calculator.broadcasting import (
     intersect,
     whole,
 )
-from kfsheet.parsing.calculator.statistics import wildcard
+from kfsheet.parsing.calculator.criteria import wildcard
 from kfsheet.parsing.calculator.values import (
     EMPTY,
     Area,

@@ -15,22 +15,35 @@ import itertools
 import math
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from kfsheet.errors import DataError, ModelError
+from kfsheet.errors import DataError, EngineError, MissingEngineError, ModelError
 from kfsheet.model.exercise import Exercise
 from kfsheet.parsing.references import Address
 from kfsheet.workbook.check.comparison import Comparison
 from kfsheet.workbook.check.frozen_figures import built_from
-from kfsheet.workbook.check.opened_workbook import Inputs, OpenedWorkbook, inputs_in, layout_of
+from kfsheet.workbook.check.opened_workbook import (
+    Inputs,
+    OpenedWorkbook,
+    inputs_in,
+    layout_of,
+    place,
+)
 from kfsheet.workbook.check.other_inputs import other_inputs
 from kfsheet.workbook.check.report import Problem, Report
-from kfsheet.workbook.engines.spreadsheet_engine import Changes, Engine
+from kfsheet.workbook.engines.recalculate import ENGINES
+from kfsheet.workbook.engines.spreadsheet_engine import UNREAD, Changes, Engine
 from kfsheet.workbook.write.check_sheet import FIGURES, TOLERANCE, probes
 from kfsheet.workbook.write.layout import Layout
 from kfsheet.workbook.write.run import Run
 
+UNKNOWN = {
+    "ironcalc": ("#NAME?", "#ERROR!", "#N/IMPL!", "#N/A", "#CIRC!", "#VALUE!"),
+    "own": (UNREAD,),
+    "libreoffice": ("#NAME?", "#VALUE!"),
+}
+"""What engines show where they do not know a formula, or perhaps know it badly."""
 ROUNDED = 5.1e-15  # half of the fifteenth digit
 
 Finder = Callable[[str], Exercise]
@@ -53,8 +66,9 @@ def check_workbook(
         columns inserted.
     exercise : Exercise, or function that finds one by name
         The exercise that it was built from.
-    engine : {'ironcalc', 'libreoffice'}
-        Who recalculates.
+    engine : {'ironcalc', 'libreoffice', 'own'}
+        Who recalculates; where it cannot open the file or does not know a formula of it, another
+        one does, and the report says so.
     started : Engine, optional
         The engine, where :func:`~kfsheet.workbook.engines.recalculate.start_engine` was called
         before: it works while this module is imported.
@@ -75,6 +89,44 @@ def check_workbook(
     EngineError
         If the engine is not installed or cannot do its work.
     """
+    try:
+        report = _checked(path, exercise, engine, started)
+    except MissingEngineError:
+        raise
+    except EngineError as error:
+        if engine not in ENGINES:
+            raise
+        if found := _by_another(path, exercise, engine, str(error)):
+            return found
+        raise
+    if report.holds or not report.unknown:
+        return report
+    words = f"{ENGINES[engine]} does not know the formula in {report.unknown[0]}"
+    found = _by_another(path, exercise, engine, words)
+    same = found and {p.address for p in found.problems} == {p.address for p in report.problems}
+    return found if found and not same else report
+
+
+def _by_another(
+    path: str | Path, exercise: Exercise | Finder, engine: str, instead: str
+) -> Report | None:
+    """What the first engine finds that opens the workbook and knows all its formulas."""
+    from kfsheet.workbook.engines.libreoffice import libreoffice  # it takes long to import
+
+    others = ["own", "libreoffice"] if libreoffice() else ["own"]
+    for other in others:
+        if other != engine:
+            with suppress(EngineError):
+                report = _checked(path, exercise, other)
+                if not report.unknown:
+                    return replace(report, instead=instead)
+    return None
+
+
+def _checked(
+    path: str | Path, exercise: Exercise | Finder, engine: str, started: Engine | None = None
+) -> Report:
+    """What one engine finds."""
     book = OpenedWorkbook(path, engine, started)
 
     # Most workbooks are as they were built. What is then asked and expected is found while the
@@ -109,6 +161,7 @@ def check_workbook(
         changed=list(_changes(inputs, now, built)),
         problems=_in_order(problems, book.package.titles),
         followers=len(differing - set(problems)),
+        unknown=[place(a) for a in sorted(problems) if book.value(a) in UNKNOWN[engine]],
     )
 
 

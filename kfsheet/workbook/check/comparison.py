@@ -5,8 +5,7 @@ The rule: a cell agrees if
     |sheet - NumPy| <= tolerance * max(|NumPy|, root mean square of its column)
 
 so that a value that is small because two numbers cancelled is not asked for more figures than
-those numbers have. The tolerance is 1e-12 for IronCalc and 1e-11 for LibreOffice, which stores 15
-digits.
+those numbers have. The tolerance is 1e-12, and 1e-11 for LibreOffice, which stores 15 digits.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from kfsheet.workbook.write.run import Run
 from kfsheet.workbook.write.sheet import Cell, Sheet, is_formula
 from kfsheet.workbook.write.write_workbook import compose
 
-TOLERANCES = {"ironcalc": 1e-12, "libreoffice": 1e-11}
+TOLERANCES = {"ironcalc": 1e-12, "own": 1e-12, "libreoffice": 1e-11}
 
 
 class Comparison:

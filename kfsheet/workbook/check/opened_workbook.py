@@ -8,7 +8,6 @@ from math import isnan
 from pathlib import Path
 from typing import Any
 
-from openpyxl import Workbook
 from openpyxl.utils import get_column_letter
 
 from kfsheet.errors import DataError, WorkbookError
@@ -18,7 +17,6 @@ from kfsheet.model.recurrence import Recurrence
 from kfsheet.parsing.references import Address
 from kfsheet.workbook.engines.recalculate import start_engine
 from kfsheet.workbook.engines.spreadsheet_engine import CellValue, Changes, Engine, Values
-from kfsheet.workbook.reading.open_workbook import open_workbook
 from kfsheet.workbook.reading.package import Package
 from kfsheet.workbook.write.layout import (
     EXERCISE_NAME,
@@ -80,12 +78,20 @@ class OpenedWorkbook:
 
     def text(self, address: Address) -> str | None:
         """The formula in a cell, written out where it is shared."""
-        sheet, row, column = address
-        return self._texts[sheet].cell(row, column).value if sheet in self._texts else None
+        from openpyxl.formula.translate import Translator  # seldom needed
+
+        sheet, *cell = address
+        content = self._cells.get(sheet, {}).get(tuple(cell))
+        if not hasattr(content, "host"):  # a constant
+            return None
+        here, there = (f"{get_column_letter(c)}{r}" for r, c in (content.host, cell))
+        return Translator(content.text, here).translate_formula(there)
 
     @cached_property
-    def _texts(self) -> Workbook:
-        return open_workbook(self.path)
+    def _cells(self) -> dict[str, dict[tuple[int, int], Any]]:
+        from kfsheet.workbook.reading.book import read_book  # it takes long to import
+
+        return read_book(self.package.container).sheets
 
     @property
     def exercise_hint(self) -> str:
@@ -100,14 +106,24 @@ class OpenedWorkbook:
         WorkbookError
             If the workbook is not one of ours.
         """
-        address = self.package.named(EXERCISE_NAME)
-        value = address and self.value(address)
-        if not isinstance(value, str):
+        address = self.named(EXERCISE_NAME) or self.labelled("exercise", "Read me")
+        value = (address and self.value(address)) or self.exercise_hint
+        if not value or not isinstance(value, str):
             raise WorkbookError(
                 f"{self.path} is a workbook, but not one of ours (no cell is named "
                 f"{EXERCISE_NAME}); make one with: kfsheet build"
             )
         return value
+
+    def named(self, name: str) -> Address | None:
+        """The cell that a defined name stands for."""
+        return self.package.named(name)
+
+    def labelled(self, name: str, sheet: str) -> Address | None:
+        """The cell to the right of the only label ``name`` of a sheet: some programs lose names."""
+        cells = self.values.get(sheet, {})
+        labels = [place for place, value in cells.items() if value == name]
+        return (sheet, labels[0][0], labels[0][1] + 1) if len(labels) == 1 else None
 
 
 def layout_of(book: OpenedWorkbook, exercise: Exercise) -> Layout:
@@ -119,7 +135,7 @@ def layout_of(book: OpenedWorkbook, exercise: Exercise) -> Layout:
         If a sheet, a column or a name is gone, or the workbook is a student's handout.
     """
     model, path = exercise.model, book.path
-    if book.package.named(TOKEN_NAME):
+    if book.named(TOKEN_NAME):
         raise WorkbookError(f"{path} is a student's handout; use: kfsheet grade")
     for sheet in ("Charts", "Check"):
         if sheet not in book.package.titles:
@@ -127,7 +143,7 @@ def layout_of(book: OpenedWorkbook, exercise: Exercise) -> Layout:
     columns = {section: _columns_of(book, model, section) for section in model.sections}
     scalars = {}
     for name in (*model.parameters, *model.derived_scalars, *model.summaries):
-        address = book.package.named(name)
+        address = book.named(name) or book.labelled(name, "Parameters")
         if address is None:
             raise WorkbookError(f"{path}: no cell is named {name}; build the workbook anew")
         sheet, row, column = address

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from kfsheet.parsing.references import Address
 from kfsheet.workbook.check.opened_workbook import place
@@ -40,6 +41,12 @@ class Report:
     followers: int
     """How many more cells differ only because they follow from one that is wrong."""
 
+    unknown: list[str] = field(default_factory=list)
+    """Cells about which the engine did not know what to say; their problems may be its own."""
+
+    instead: str = ""
+    """Why the engine that was asked for has not calculated, if another one has."""
+
     def lines(self) -> list[str]:
         """The problems in words, neighbours in a column with the same reason as one line."""
         groups: list[list[Problem]] = []
@@ -59,6 +66,21 @@ class Report:
     def holds(self) -> bool:
         """Whether every formula cell agrees."""
         return not self.problems
+
+    def as_dict(self) -> dict[str, Any]:
+        """For a file of results; keys as in docs/checking.md."""
+        return {
+            "workbook": str(self.path),
+            "holds": self.holds,
+            "engine": self.engine,
+            "instead": self.instead,
+            "formulas": self.cells,
+            "largest": self.largest,
+            "changed": self.changed,
+            "problems": [{"cell": place(p.address), "reason": p.reason} for p in self.problems],
+            "followers": self.followers,
+            "verdict": self.verdict,
+        }
 
     @property
     def verdict(self) -> str:

@@ -10,7 +10,7 @@ from operator import itemgetter
 from pathlib import Path
 from types import ModuleType
 
-from kfsheet.errors import EngineError
+from kfsheet.errors import EngineError, MissingEngineError
 from kfsheet.workbook.engines.copies_for_engines import copy_for_ironcalc
 from kfsheet.workbook.engines.spreadsheet_engine import CellValue, Changes, Values
 
@@ -36,7 +36,7 @@ def _ironcalc() -> ModuleType:
     try:
         import ironcalc
     except ImportError:
-        raise EngineError(
+        raise MissingEngineError(
             'IronCalc is not installed; pip install "kfsheet[check]", or use libreoffice'
         ) from None
     return ironcalc

@@ -29,12 +29,13 @@ from select import select
 from threading import Timer
 from typing import BinaryIO
 
-from kfsheet.errors import EngineError, KfsheetError, WorkbookError
+from kfsheet.errors import EngineError, KfsheetError, MissingEngineError, WorkbookError
 from kfsheet.processes import answers, command, kill
 from kfsheet.workbook.engines.ironcalc import Cells, IronCalc, by_address
 from kfsheet.workbook.engines.spreadsheet_engine import TIMEOUT, Changes, Values
 
 VALUES = "values"  # the kind of an answer that is none of the errors
+ERRORS = {error.__name__: error for error in (WorkbookError, MissingEngineError)}
 
 
 class IronCalcProcess:
@@ -84,7 +85,7 @@ class IronCalcProcess:
         self._asked = {question: n for question, n in self._asked.items() if n > number}
         kind, *found = marshal.loads(self._shared.take(f"answer {number}"))
         if kind != VALUES:
-            raise {"WorkbookError": WorkbookError}.get(kind, EngineError)(*found)
+            raise ERRORS.get(kind, EngineError)(*found)
         cells, values = found
         return by_address(cells or self._cells, values)
 

@@ -13,7 +13,7 @@ from kfsheet.workbook.engines.ironcalc import IronCalc
 from kfsheet.workbook.engines.ironcalc_process import IronCalcProcess
 from kfsheet.workbook.engines.spreadsheet_engine import Changes, Engine, Values
 
-ENGINES = {"ironcalc": "IronCalc", "libreoffice": "LibreOffice"}
+ENGINES = {"ironcalc": "IronCalc", "libreoffice": "LibreOffice", "own": "kfsheet's calculator"}
 """Names of engines, and what their makers call them."""
 
 
@@ -26,8 +26,9 @@ def recalculate(
     ----------
     path : path
         An ``.xlsx`` file; it is not changed.
-    engine : {'ironcalc', 'libreoffice'}
-        IronCalc comes with ``pip install "kfsheet[check]"``; LibreOffice must be installed.
+    engine : {'ironcalc', 'libreoffice', 'own'}
+        IronCalc comes with ``pip install "kfsheet[check]"``; LibreOffice must be installed; our
+        own is always there.
     changes : dict, optional
         Numbers that replace the content of cells before the calculation.
 
@@ -56,6 +57,10 @@ def open_in(path: str | Path, engine: str = "ironcalc") -> Engine:
         from kfsheet.workbook.engines.libreoffice import LibreOffice
 
         return LibreOffice(Path(path))
+    if engine == "own":
+        from kfsheet.workbook.engines.own import Own  # it reads with openpyxl's words, too
+
+        return Own(Path(path))
     return IronCalc(Path(path))
 
 

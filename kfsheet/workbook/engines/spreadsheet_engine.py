@@ -6,6 +6,8 @@ from typing import Protocol
 
 TIMEOUT = 300  # seconds that an answer may take
 
+UNREAD = "#ERROR!"  # what our own engine shows where it cannot calculate a formula
+
 Changes = dict[str, dict[tuple[int, int], float | None]]
 """Numbers to put into cells before calculating, by sheet and (row, column); None empties one."""
 CellValue = float | int | str | bool | None

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import warnings
+from io import BytesIO
 from pathlib import Path
 
 import openpyxl
-from openpyxl.utils.exceptions import InvalidFileException
 
-from kfsheet.workbook.reading.archive import refusing
-
-# What openpyxl raises by accident, where XML is not what a spreadsheet program writes.
-ACCIDENTS = ValueError, TypeError, AttributeError, IndexError
+from kfsheet.workbook.reading.archive import Container, refusing
+from kfsheet.workbook.reading.normal_form import normal_form
 
 
 def open_workbook(path: str | Path, *, data_only: bool = False) -> openpyxl.Workbook:
@@ -22,7 +20,8 @@ def open_workbook(path: str | Path, *, data_only: bool = False) -> openpyxl.Work
     WorkbookError
         If the file cannot be read or is no workbook.
     """
-    with refusing(path, InvalidFileException, *ACCIDENTS), warnings.catch_warnings():
+    with refusing(path), warnings.catch_warnings():
         # openpyxl warns of parts that it does not keep; we only read.
         warnings.simplefilter("ignore", UserWarning)
-        return openpyxl.load_workbook(path, data_only=data_only)
+        content = normal_form(Container.open(path)).content
+        return openpyxl.load_workbook(BytesIO(content), data_only=data_only)

@@ -1,22 +1,21 @@
 """The parts of an .xlsx file as they are: sheets, names, formula cells.
 
-Worksheets of 10 MB are read by regular expressions that look at tags, whatever their prefix: an
-XML parser needs a second for what is a question of a tenth.
+Worksheets of 10 MB are read by regular expressions that look at tags: an XML parser needs a second
+for what is a question of a tenth.
 """
 
 from __future__ import annotations
 
 import re
-import zipfile
 from collections import defaultdict
 from pathlib import Path
 
-from defusedxml import ElementTree
 from openpyxl.utils import column_index_from_string, coordinate_to_tuple
 from openpyxl.workbook.defined_name import DefinedName
 
 from kfsheet.parsing.references import Address
-from kfsheet.workbook.reading.archive import CUSTOM, MAIN, properties, refusing, worksheet_parts
+from kfsheet.workbook.reading.archive import Container, elements, refusing
+from kfsheet.workbook.reading.normal_form import normal_form
 
 # It begins with letters that are searched for quickly; only a cell has such an attribute.
 FORMULA_CELL = re.compile(rb'r="([A-Z]+)([1-9][0-9]*)"[^<>]*>\s*<(?:\w+:)?f\b')
@@ -33,14 +32,17 @@ class Package:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        with refusing(path), zipfile.ZipFile(path) as archive:
-            book = ElementTree.fromstring(archive.read("xl/workbook.xml"))
-            self._sheets = {t: archive.read(part) for t, part in worksheet_parts(archive).items()}
-            custom = archive.read(CUSTOM) if CUSTOM in archive.namelist() else None
-            self.properties = properties(ElementTree.fromstring(custom)) if custom else {}
-        self._names = {
-            name.get("name", ""): name.text or "" for name in book.iter(f"{{{MAIN}}}definedName")
-        }
+        with refusing(path):
+            self.container = normal_form(Container.open(path))
+            self.properties = self.container.properties
+            self._sheets = {
+                title: self.container.read(part)
+                for title, part in self.container.worksheets.items()
+            }
+            self._names = {
+                name.get("name", "").lower(): name.text or ""
+                for name in elements(self.container.workbook, "definedName")
+            }
 
     @property
     def titles(self) -> list[str]:
@@ -59,9 +61,8 @@ class Package:
 
     def named(self, name: str) -> Address | None:
         """The one cell that a defined name stands for, if there is such a cell."""
-        if not self._names.get(name):
-            return None
-        places = list(DefinedName(name, attr_text=self._names[name]).destinations)
+        text = self._names.get(name.lower())
+        places = list(DefinedName(name, attr_text=text).destinations) if text else []
         if len(places) != 1 or places[0][0] not in self._sheets:
             return None
         try:

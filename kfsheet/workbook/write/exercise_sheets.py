@@ -121,17 +121,22 @@ def _line(sheet: Sheet, row: int, column: int, item: Any, value: Cell) -> None:
     sheet.put(row, column + 2, item.description, "meaning", align="wrap")
 
 
-def helper_columns(exercise: Exercise) -> list[tuple[str, str]]:
+def helper_columns(
+    exercise: Exercise, waiting: frozenset[str] = frozenset()
+) -> list[tuple[str, str]]:
     """Formula columns on charts that may have no value; a chart would show their "" as 0.
 
-    Each with the column that is 0 where it is not drawn, ``""`` if it has gaps of its own.
+    Each with the column that is 0 where it is not drawn, ``""`` if it has gaps of its own, or no
+    value yet.
     """
     found = {}
+    given = waiting - {question.name for question in exercise.questions}  # these are empty cells
     for chart in exercise.charts:
         for name in (n for s in chart.series for n in (s.x, s.y)):
             # A start that is Missing is an empty cell, which a chart leaves out anyway.
             rules = exercise.model.column(name).rules
-            if any(r is not Missing and r.has(Missing) for r in rules):
+            later = rules and name in given
+            if later or any(r is not Missing and r.has(Missing) for r in rules):
                 found[name, ""] = None
             elif chart.where:
                 found[name, chart.where] = None
@@ -147,7 +152,7 @@ def charts_sheet(exercise: Exercise, layout: Layout, now: Run) -> Sheet:
     sheet.put(1, 1, exercise.title, "title")
     for number, chart in enumerate(exercise.charts):
         sheet.put(*chart_place(number), Words(chart.note), "note")
-    names = helper_columns(exercise)
+    names = helper_columns(exercise, layout.waiting)
     if names:
         sheet.put(2, 1, "Helper columns for the charts stand from AA on.")
     for at, (name, where) in enumerate(names, FIRST_HELPER_COLUMN):
@@ -183,7 +188,7 @@ def _cells(layout: Layout, name: str) -> str:
 
 def chart_range(exercise: Exercise, layout: Layout, name: str, where: str = "") -> tuple[str, int]:
     """Sheet and column number from which a chart, with its ``where``, takes a column."""
-    names = helper_columns(exercise)
+    names = helper_columns(exercise, layout.waiting)
     for copy in ((name, ""), (name, where)):
         if copy in names:
             return "Charts", FIRST_HELPER_COLUMN + names.index(copy)
@@ -193,12 +198,12 @@ def chart_range(exercise: Exercise, layout: Layout, name: str, where: str = "") 
 CHARACTERS_A_LINE = 130  # of the two columns of "Read me" together
 
 
-def readme_sheet(exercise: Exercise, layout: Layout) -> Sheet:
+def readme_sheet(exercise: Exercise, built: Run) -> Sheet:
     """The first worksheet: what this is, how to use it, what the colours mean."""
     sheet = Sheet("Read me", widths={1: 22, 2: 100})
     sheet.put(1, 1, exercise.title, "title")
     row = 3
-    for paragraph in exercise.about:
+    for paragraph in exercise.story(built.scalars):
         sheet.put(row, 1, Words(paragraph), "text", align="wrap")
         sheet.merges.append(f"A{row}:B{row}")
         sheet.heights[row] = 16 * (1 + len(paragraph) // CHARACTERS_A_LINE) + 4

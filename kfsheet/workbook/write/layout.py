@@ -15,7 +15,7 @@ from openpyxl.utils import get_column_letter, quote_sheetname
 from sympy import Basic, Expr, Indexed, IndexedBase, Symbol
 
 from kfsheet.errors import PrintError
-from kfsheet.model.expressions import Last, lag, t
+from kfsheet.model.expressions import Last, Missing, Observed, lag, t, walk
 from kfsheet.model.recurrence import Recurrence
 from kfsheet.parsing.references import Address
 from kfsheet.printing.excel import HARD_LIMIT, excel_code
@@ -44,13 +44,15 @@ class Layout:
     model: Recurrence
     columns: dict[str, dict[str, int]]
     scalars: dict[str, Address]
+    waiting: frozenset[str] = frozenset()
+    """Columns and scalars that have no value yet; a formula that reads one is "" until it has."""
     _templates: dict[tuple[Expr, str], tuple[str, int]] = field(
         default_factory=dict, repr=False, compare=False
     )
 
     @classmethod
-    def standard(cls, model: Recurrence) -> Layout:
-        """The layout in which workbooks are written."""
+    def standard(cls, model: Recurrence, waiting: frozenset[str] = frozenset()) -> Layout:
+        """The layout in which workbooks are written; ``waiting`` is that of a handout."""
         columns = {
             section: {
                 name: n
@@ -71,7 +73,7 @@ class Layout:
             row += 1
         for n, name in enumerate(model.summaries):
             scalars[name] = ("Parameters", PARAMETER_ROW + n, 7)
-        return cls(model, columns, scalars)
+        return cls(model, columns, scalars, waiting)
 
     @property
     def last_row(self) -> int:
@@ -113,12 +115,38 @@ class Layout:
         key = (expression, sheet)
         if key not in self._templates:
             names = _Names(self, sheet)
-            template = "=" + excel_code(expression, names)
+            code = excel_code(expression, names)
             # The last row has the longest numbers.
-            if len(template.format(*repeat(self.last_row, names.depth + 1))) > HARD_LIMIT:
-                raise PrintError(f"a formula on {sheet} is longer than {HARD_LIMIT}: {template}")
+            if len(code.format(*repeat(self.last_row, names.depth + 1))) >= HARD_LIMIT:
+                raise PrintError(f"a formula on {sheet} is longer than {HARD_LIMIT}: ={code}")
+            guard = self._not_there_yet(expression, names) if self.waiting else ""
+            template = f'=IF({guard},"",{code})' if guard else f"={code}"
             self._templates[key] = template, names.depth
         return self._templates[key]
+
+    def _not_there_yet(self, expression: Expr, names: _Names) -> str:
+        """Condition under which something that an expression reads has no value yet.
+
+        What may be missing for good is not asked for: the expression knows what to do then.
+        """
+        asked = {cell for test in expression.atoms(Observed) for cell in test.args}
+        cells, wholes = set(), set()
+        for node in walk(expression):
+            if isinstance(node, Indexed) and node not in asked:
+                column = self.model.column(str(node.base.label))
+                if column.name in self.waiting and not column.may_be_missing:
+                    cells.add(names(node))
+            elif isinstance(node, Symbol) and node.name in self.waiting:
+                cells.add(node.name)
+            elif isinstance(node, IndexedBase) and str(node.label) in self.waiting:
+                wholes.add(str(node.label))
+        tests = [f"COUNT({','.join(sorted(cells))})<{len(cells)}"] if cells else []
+        for name in sorted(wholes):
+            column = self.model.column(name)
+            some = column.may_be_missing or any(rule.has(Missing) for rule in column.start)
+            least = "2" if some else f"ROWS({self.range(name)})"
+            tests.append(f"COUNT({self.range(name)})<{least}")
+        return f"OR({','.join(tests)})" if len(tests) > 1 else "".join(tests)
 
 
 class _Names:

@@ -32,7 +32,7 @@ PLAIN_WORDS = {
     UNREADABLE: "the formula could not be judged",
     WRONG: "the formula gives another value than the right one",
 }
-UNSEEN = "right where there is an observation, wrong where one is missing"
+UNSEEN = "right where all is observed, wrong where an observation is missing"
 CLOSE = f"most values lie within {100 * ROUGH:g} % of the right ones, and are not equal"
 NEAR = 0.01
 """How far a typed number may be from a parameter's own value and still stand for it."""
@@ -138,6 +138,9 @@ def _worth(outcomes: Sequence[Outcome]) -> str:
     """The status of a formula that is not right in every world."""
     if _is_typed(outcomes):
         return TYPED
+    # What is nearly equal in every run was rounded; it may be equal in the student's own by chance.
+    if all(same(o.found, o.wanted, tolerance=ROUGH) for o in outcomes):
+        return NEARLY
     if _right([o for o in outcomes if o.world.own]):
         return HARD_CODED
     seen = [o for o in outcomes if not o.world.gaps and o.wanted != ""]

@@ -1,45 +1,49 @@
-"""One worksheet of a submission, element by element: formulas, numbers and texts, nothing else."""
+"""One worksheet, element by element: formulas, numbers and texts; never a stored value."""
 
 from __future__ import annotations
 
 import re
+from math import isfinite
 from xml.parsers import expat
 
 from openpyxl.utils import column_index_from_string, range_boundaries
 
-from kfsheet.errors import SubmissionError
+from kfsheet.errors import UnreadableFileError
 from kfsheet.parsing.calculator import Content, Formula
 from kfsheet.parsing.references import Cell
 from kfsheet.printing.excel_names import LAST_COLUMN, LAST_ROW
 
-MOST_CELLS = 400_000  # of a submission
 LONGEST_TEXT = 40_000  # characters in a cell; Excel's limit is 32,767
 PLACE = re.compile(r"([A-Z]{1,3})([1-9]\d{0,6})")
+TABLE = "=TABLE()"  # Excel's name for what a data table holds; no formula is written there
 
 
 class Budget:
     """How many cells may still come."""
 
-    def __init__(self, cells: int) -> None:
-        self.cells = cells
+    def __init__(self, cells: float) -> None:
+        self.cells = self._most = cells
 
     def spend(self) -> None:
-        """One cell; SubmissionError where none may come."""
+        """One cell; UnreadableFileError where none may come."""
         self.cells -= 1
         if self.cells < 0:
-            raise SubmissionError("too large", f"the file has more than {MOST_CELLS} cells")
+            words = f"the file has more than {self._most} cells"
+            raise UnreadableFileError("too large", words)
 
 
 class SheetReader:
-    """One worksheet, element by element."""
+    """One worksheet in its plain form, element by element."""
 
     def __init__(self, strings: list[str], budget: Budget) -> None:
         self._strings, self._budget = strings, budget
         self.cells: dict[Cell, Content] = {}
         self._shared: dict[str, Formula] = {}
+        self._waiting: dict[Cell, str] = {}
+        """Cells whose shared formula has not come yet, and its number."""
         self._at: Cell = (0, 0)
-        self._type, self._formula, self._words = "", None, None
-        self._value, self._listening = "", False
+        self._type, self._formula, self._words = "", None, []
+        self._value, self._listening, self._deaf = "", False, False
         self._attributes: dict[str, str] = {}
 
     def read(self, xml: bytes) -> dict[Cell, Content]:
@@ -51,47 +55,40 @@ class SheetReader:
         parser.StartDoctypeDeclHandler = self._refuse
         parser.buffer_text = True
         parser.Parse(xml, True)
+        for place, number in self._waiting.items():
+            if number in self._shared:
+                self.cells[place] = self._shared[number]
         return self.cells
 
     @staticmethod
     def _refuse(*_: object) -> None:
-        raise SubmissionError("refused", "its XML declares a document type")
+        raise UnreadableFileError("refused", "its XML declares a document type")
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
-        tag = tag.rpartition(":")[2] if ":" in tag else tag
         if tag == "v" or tag == "t":
-            self._words, self._listening = [], True
-        elif tag == "row":
-            row = int(attributes["r"]) if "r" in attributes else self._at[0] + 1
-            self._at = (row, 0)
+            self._words, self._listening = [], not self._deaf
         elif tag == "c":
             self._budget.spend()
-            self._at = self._place(attributes.get("r"))
+            self._at = _place(attributes["r"])
             self._type = attributes.get("t", "n")
             self._formula, self._value = None, ""
         elif tag == "f":
             self._attributes, self._words, self._listening = attributes, [], True
-
-    def _place(self, text: str | None) -> Cell:
-        if text is None:
-            return self._at[0], self._at[1] + 1
-        match = PLACE.fullmatch(text)
-        place = match and (int(match[2]), column_index_from_string(match[1]))
-        if not place or place[0] > LAST_ROW or place[1] > LAST_COLUMN:
-            raise SubmissionError("damaged", f"the workbook has a cell {text[:20]!r}")
-        return place
+        elif tag == "rPh":  # how a Japanese text is pronounced
+            self._deaf = True
 
     def _hear(self, words: str) -> None:
         if self._listening:
             self._words.append(words)
 
     def _end(self, tag: str) -> None:
-        tag = tag.rpartition(":")[2] if ":" in tag else tag
         if tag == "f":
             self._formula, self._listening = self._read_formula("".join(self._words)), False
         elif tag in ("v", "t") and self._listening:
             self._value += "".join(self._words)
             self._listening = False
+        elif tag == "rPh":
+            self._deaf = False
         elif tag == "c":
             self._close()
 
@@ -102,11 +99,14 @@ class SheetReader:
             number = self._attributes.get("si", "")
             if text:
                 self._shared[number] = Formula(f"={text}", self._at)
+            elif number not in self._shared:
+                self._waiting[self._at] = number
             return self._shared.get(number)
+        if kind == "dataTable":
+            return Formula(TABLE, self._at, self._area())
         if not text:
             return None
-        array = kind in ("array", "dataTable")
-        return Formula(f"={text}", self._at, self._area() if array else None)
+        return Formula(f"={text}", self._at, self._area() if kind == "array" else None)
 
     def _area(self) -> tuple[int, int, int, int]:
         """The cells that an array formula fills, its own one at least."""
@@ -125,7 +125,18 @@ class SheetReader:
 
     def _typed(self, value: str) -> Content:
         if self._type == "n":
-            return float(value)
+            number = float(value)
+            return number if isfinite(number) else Formula("=#NUM!", self._at)
         if self._type == "s":
             return self._strings[int(value)]
-        return value == "1" if self._type == "b" else value
+        if self._type == "e":  # an error that was typed is one to whoever refers to it
+            return Formula(f"={value}", self._at)
+        return value in ("1", "true") if self._type == "b" else value
+
+
+def _place(text: str) -> Cell:
+    match = PLACE.fullmatch(text)
+    place = match and (int(match[2]), column_index_from_string(match[1]))
+    if not place or place[0] > LAST_ROW or place[1] > LAST_COLUMN:
+        raise UnreadableFileError("damaged", f"the workbook has a cell {text[:20]!r}")
+    return place
