@@ -86,7 +86,12 @@ class Line:
 def qualified(text, sheet):
     """A formula as it must read on another sheet."""
     title = f"'{sheet}'!" if re.search(r"\W", sheet) else f"{sheet}!"
-    return in_code(text, lambda m: m[0] if m[1] else title + m[0])
+    return in_code(text, lambda m: m[0] if m[1] or _ends_a_range(m) else title + m[0])
+
+
+def _ends_a_range(match):
+    """Whether a reference is the second corner of a range: it is on the sheet of the first."""
+    return match.string[: match.start()].endswith(":")
 
 
 def in_code(text, change):
@@ -99,10 +104,12 @@ def in_code(text, change):
 
 def moved(text, question, letter):
     """A formula of an answer for a copy of it in another column: own cells are the copy's."""
-    own = question.letter
+    own, sheet = question.letter, question.sheet
 
     def change(match):
-        sheet = match[1][:-1].strip("'") if match[1] else question.sheet
+        nonlocal sheet
+        if not _ends_a_range(match):
+            sheet = match[1][:-1].strip("'") if match[1] else question.sheet
         if sheet != question.sheet or match[3] != own or int(match[5]) not in question.copied:
             return match[0]
         return f"{match[1] or ''}{match[2]}{letter}{match[4]}{match[5]}"

@@ -132,7 +132,9 @@ def wrapped_number(line, part, counts):
 
 def wrapped(line, part, counts):
     """Around any value, also an empty text."""
-    if part[0] == "omitted":
+    # What IF or IFERROR make of an empty cell is another thing in every program.
+    empty = part[0] == "ref" and line.course.may_be_empty(line.place(part[1]))
+    if part[0] == "omitted" or empty:
         return None
     x = part
     return line.dice.choice([
