@@ -21,7 +21,9 @@ from kfsheet.coursework.handout.handout_workbook import handout_bytes, own_run
 from kfsheet.coursework.handout.live_checks import A_CHECK, FIRST_COLUMN, FIRST_LINE, HIDDEN
 from kfsheet.coursework.handout.own_numbers import own_numbers
 from kfsheet.coursework.handout.questions_sheet import EMPTY, FIRST, LOOKS_RIGHT, NOT_YET
+from kfsheet.coursework.judging.calculated_answers import CalculatedAnswers
 from kfsheet.coursework.judging.changed_cells import changed_cells
+from kfsheet.coursework.judging.model_runs import ModelRuns
 from kfsheet.coursework.reading.cell_addresses import CellAddresses
 from kfsheet.coursework.reading.submission import read_submission
 from kfsheet.exercises import exercise_names
@@ -345,7 +347,9 @@ def test_guarded_formulas_are_no_changed_cells(tmp_path):
         sheet = paper(name).open(tmp_path / f"{name}.xlsx").answer_all()
         book = read_submission(sheet.save())
         addresses = CellAddresses.find(book, sheet.model)
-        assert changed_cells(sheet.exercise, book, addresses, sheet.own) == []
+        runs = ModelRuns(sheet.exercise)
+        calculated = CalculatedAnswers(book, addresses, runs.own_worlds(sheet.own))
+        assert changed_cells(sheet.exercise, book, addresses, sheet.own, calculated) == []
 
 
 def small(**more):
