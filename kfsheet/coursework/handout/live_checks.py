@@ -26,7 +26,7 @@ from kfsheet.workbook.write.sheet import Sheet
 HIDDEN = "kfsheet"
 HEADS = "answer filled failed done block inside next to last asked reach who begin end".split()
 FACTOR, WINDOW = "$B$1", "$C$1"
-FIRST_LINE, FIRST_COLUMN, A_CHECK = 3, 3, 3
+FIRST_LINE, FIRST_COLUMN, A_CHECK = 3, 3, 4
 
 
 @dataclass(frozen=True)
@@ -184,7 +184,9 @@ class LiveChecks:
             self.sheet.put(row, at + 1, f"=MIN({nth},{self._rows - 1})+1", "formula")
             text = f'=IF(ISNUMBER(INDEX({all_kept},{place})),INDEX({all_kept},{place}),"")'
             self.sheet.put(row, at, text, "formula")
-            cell = f"INDEX({cells},{place})"
+            found, cell = f"INDEX({cells},{place})", f"{get_column_letter(at + 3)}{row}"
+            # A formula that reads an empty cell would be 0.
+            self.sheet.put(row, at + 3, f'=IF(ISBLANK({found}),"-",{found})', "formula")
             gap = f"IF(ISTEXT({cell}),IF(LEN({cell})=0,1,0),0)"
             value = f"IF(ISNUMBER({cell}),{self._passes(cell, row, at)},0)"
             self.sheet.put(row, flag, f"=IF(ISNUMBER({kept}),{value},{gap})", "formula")
