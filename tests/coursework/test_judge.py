@@ -486,6 +486,51 @@ def test_circular_answers_are_told(football):
     assert "goes in a circle" in mark.remark
 
 
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        (("K_z_z", "=BI{r}*X{r}/Y{r}"), ("K_vz_z", "=BH{r}*Y{r}/X{r}")),
+        (("z_f", "=BK{p}+dt*(BL{p}+J{r})/2"), ("vz_f", "=2*(I{r}-BK{p})/dt-BL{p}")),
+        (("p_z_raw", "=(Q{r}-S{r}*F{r})/E{r}"), ("v_z_raw", "=(Q{r}-R{r}*E{r})/F{r}")),
+    ],
+)
+def test_two_answers_that_lean_on_each_other_are_both_wrong(handouts, tmp_path, first, second):
+    """Each is true if the other is; in the sheet neither has a value."""
+    paper = Paper(load_exercise("shuttlecock"), ADA, handouts("shuttlecock"))
+    paper.open(tmp_path / "a.xlsx").answer_all()
+    for name, text in (first, second):
+        starts = len(paper.model.column(name).start)
+        for cell, _ in paper.cells(name)[starts:]:
+            cell.value = text.format(r=cell.row, p=cell.row - 1)
+    _, marks = judged(paper)
+    for name, other in ((first[0], second[0]), (second[0], first[0])):
+        assert (marks[name].status, marks[name].score) == ("wrong", 0)
+        assert f"circle with {other}" in marks[name].remark
+
+
+@pytest.mark.parametrize(
+    "nothing",
+    ["0*COUNT(K{r})", "IFERROR(0*K{r},0)", "0*COUNT(K$4:K$19)", "0*COUNTA(I{r})",
+     "0*ISERROR(K{r})", '0*COUNTIF(I:I,">0")', "0*AGGREGATE(9,6,K$4:K$19)"],
+)  # fmt: skip
+def test_a_circle_that_a_function_swallows_is_one(football, nothing):
+    football.answer_all()
+    for cell, text in football.cells("x_f")[1:]:
+        cell.value = f"{text}+{nothing.format(r=cell.row)}"
+    mark = one(football, "x_f")
+    assert (mark.status, mark.score) == ("wrong", 0)
+    assert "circle" in mark.remark
+
+
+@pytest.mark.parametrize("form", ['NUMBERVALUE("0,5",",")*2', "BITAND(1,1)", 'ARABIC("I")'])
+def test_a_newer_function_that_an_engine_knows_is_judged_by_it(football, form):
+    if not libreoffice():
+        pytest.skip("LibreOffice is not installed")
+    football.answer_all()
+    football.answer("K_x", lambda text, _: f"=_xlfn.{form}*{text[1:]}")
+    assert one(football, "K_x").status == "right"
+
+
 def test_rows_that_are_right_are_named_beside_empty_ones(football):
     football.answer_all()
     for cell, _ in football.cells("d_i")[5:]:

@@ -7,6 +7,7 @@ other cells hold what they hold.
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
@@ -22,6 +23,8 @@ TOLERANCE = 1e-9  # an answer that adds in another order rounds in another way
 SMALL = 1e-4  # of a column's root mean square: differences of large numbers are small and rough
 WORK = 200_000  # operations of one formula
 SECONDS = 2.0  # of one answer, all rows and worlds together
+MOMENT = 0.05  # a limit of no time at all would be none
+LOOK_UP = re.compile(r"LOOKUP\(|MATCH\(|FILTER\(")
 KEPT = 4  # workbooks whose cells a world keeps: those of moved rows are few
 Value = float | str | bool | Error | None
 Cells = dict[str, dict[Cell, Value]]
@@ -42,7 +45,7 @@ class CalculatedAnswers:
 
     def __init__(self, book: Book, addresses: CellAddresses, worlds: Sequence[World]) -> None:
         self.worlds = worlds
-        self._addresses, self._own = addresses, worlds[0]
+        self._addresses, self._own, self._contents = addresses, worlds[0], book.sheets
         self._base = SheetCalculator(book.sheets, {**book.names, **book.sheet_names}, work=WORK)
         self._sheets: dict[World, SheetCalculator] = {}
         self._places = _places(addresses)
@@ -59,6 +62,10 @@ class CalculatedAnswers:
     def begin(self) -> None:
         """A new answer, with time of its own."""
         self.deadline = time.process_time() + SECONDS
+
+    def time_left(self) -> float:
+        """Seconds of computing for this answer."""
+        return max(MOMENT, min(SECONDS, self.deadline - time.process_time()))
 
     def outcomes(
         self, name: str, step: int, address: Address, worlds: Sequence[World] | None = None
@@ -83,17 +90,33 @@ class CalculatedAnswers:
         return Outcome(found, wanted, same(found, wanted, world.sizes.get(name, 0.0)), world)
 
     def needs(self, chosen: Chosen, address: Address) -> bool:
-        """Whether a formula gives something else if the cells that are chosen are errors.
+        """Whether a formula gives something else if the cells that are chosen are errors."""
+        return self._spoilt(chosen, address)[0]
 
-        An error that is swallowed, by ISNUMBER say, shows as well as one that comes through.
+    def reads(self, chosen: Chosen, address: Address) -> bool:
+        """The same, or it looks at one of them: COUNT and IFERROR swallow an error, and no circle.
+
+        An array or a look-up reads many cells of which only some count.
         """
+        differs, looked_at = self._spoilt(chosen, address)
+        return differs or (looked_at and not self._picks(address))
+
+    def _spoilt(self, chosen: Chosen, address: Address) -> tuple[bool, bool]:
         cells = self._cells(self._own)
         spoilt = {name: _Spoilt(self._addresses, name, chosen, cells[name]) for name in cells}
         try:
             found = self._base.with_values(spoilt).formula_value(address)
         except KfsheetError:  # it goes another way, to what we cannot calculate
+            return True, True
+        differs = not same(found, self._sheet(self._own).formula_value(address))
+        return differs, any(sheet.were_read for sheet in spoilt.values())
+
+    def _picks(self, address: Address) -> bool:
+        """Whether only some of the cells that a formula reads count: a look-up, or an array."""
+        content = self._contents.get(address[0], {}).get(address[1:])
+        if not isinstance(content, Formula) or content.area or content.dynamic:
             return True
-        return not same(found, self._sheet(self._own).formula_value(address))
+        return bool(LOOK_UP.search(content.text.upper()))
 
     def works(self, name: str, step: int, address: Address) -> bool:
         """Whether a cell, calculated in the student's own file, has the key's value."""
@@ -143,13 +166,17 @@ class _Spoilt(dict[Cell, Value]):
         super().__init__()
         self._addresses, self._sheet = addresses, sheet
         self._chosen, self._others = chosen, cells
+        self.were_read = False
 
     def __missing__(self, cell: Cell) -> Value:
         role = self._addresses.role((self._sheet, *cell))
         if role is None:
             raise KeyError(cell)
         name, step = (role, 0) if isinstance(role, str) else role
-        return Error.CIRC if self._chosen(name, step) else self._others[cell]
+        if not self._chosen(name, step):
+            return self._others[cell]
+        self.were_read = True
+        return Error.CIRC
 
 
 def _places(addresses: CellAddresses) -> tuple:

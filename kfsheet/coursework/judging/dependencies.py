@@ -1,4 +1,4 @@
-"""What follows from an answer, row by row, and what an answer follows from."""
+"""What follows from an answer, row by row, and the parameters in its definition."""
 
 from __future__ import annotations
 
@@ -47,26 +47,9 @@ def _ways(item: Column | Scalar, rule: Basic, found: dict[str, float]) -> Iterat
         yield -inf  # a sum over a column follows from every row of it
 
 
-@lru_cache(maxsize=1_000)
-def ancestors(model: Recurrence, name: str) -> frozenset[str]:
-    """Columns and scalars from which a quantity follows, whatever the row."""
-    found: set[str] = set()
-    waiting = [name]
-    while waiting:
-        item = _defined(model, waiting.pop())
-        read = {n for rule in item.rules for n in _read(rule)} if item else set()
-        waiting += read - found
-        found |= read
-    return frozenset(found)
-
-
 def _defined(model: Recurrence, name: str) -> Column | Scalar | None:
     scalars_too = {**model.derived_scalars, **model.summaries}
     return model.table.get(name) or scalars_too.get(name)
-
-
-def _read(rule: Basic) -> set[str]:
-    return set(columns_read(rule)) | {s.name for s in scalars(rule)}
 
 
 @lru_cache(maxsize=1_000)

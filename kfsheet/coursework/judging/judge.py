@@ -24,7 +24,7 @@ from kfsheet.coursework.judging.answer_rows import (
     rows_of,
     shape,
 )
-from kfsheet.coursework.judging.calculated_answers import SECONDS, CalculatedAnswers
+from kfsheet.coursework.judging.calculated_answers import CalculatedAnswers
 from kfsheet.coursework.judging.mistakes.diagnosis import (
     EMPTY,
     GAPS,
@@ -61,6 +61,14 @@ CREDIT = {RIGHT: 1.0, HARD_CODED: 0.5, PARTLY: 0.5, GAPS: 0.5, NEARLY: 0.5}
 NUMBER = re.compile(r"\{[^}]*\}|(?<![\w.])\d+(?:\.\d+)?(?:[eE][+-]?\d+)?")  # {row,column} is none
 FORMULA = "formula"  # a cell that is not judged yet
 UNKNOWN = re.compile(r"the function (\S+) is not known")
+NEWER = frozenset(
+    "ACOT ACOTH ARABIC ARRAYTOTEXT BASE BINOM.DIST.RANGE BITAND BITLSHIFT BITOR BITRSHIFT BITXOR "
+    "CEILING.MATH CEILING.PRECISE COMBINA COT COTH CSC CSCH DAYS DECIMAL FLOOR.MATH FLOOR.PRECISE "
+    "FORECAST.LINEAR FORMULATEXT GAMMA GAUSS IMCOSH IMCOT IMCSC IMCSCH IMSEC IMSECH IMSINH IMTAN "
+    "ISFORMULA ISO.CEILING ISOWEEKNUM MUNIT NUMBERVALUE PDURATION PERMUTATIONA PHI RRI SEC SECH "
+    "SHEET SHEETS SKEW.P UNICHAR UNICODE XOR".split()
+)
+"""Functions since Excel 2010, which openpyxl does not list, that an engine may know."""
 GIVEN_UP = "given up: "
 FEW = 40  # rows of one formula that are all calculated; of more, those at which something changes
 OWN = 2  # worlds in which all rows are: the student's own numbers, and half of the observations
@@ -112,7 +120,14 @@ class Judge:
 
     def marks(self) -> list[Mark]:
         """One mark for each question."""
-        return [self._mark_or_reason(asked) for asked in self._exercise.questions]
+        marks = [self._mark_or_reason(asked) for asked in self._exercise.questions]
+        circles = self._own_work.circles(
+            {m.name: self._found(m.name, m.step) for m in marks if m.status == RIGHT}
+        )
+        return [
+            replace(m, score=0.0, status=WRONG, remark=circles[m.name]) if m.name in circles else m
+            for m in marks
+        ]
 
     def _mark_or_reason(self, asked: Question) -> Mark:
         try:
@@ -208,7 +223,7 @@ class Judge:
         self, name: str, cell: AnswerCell, worlds: Sequence[World] | None = None
     ) -> AnswerCell:
         try:
-            with time_limit(SECONDS):
+            with time_limit(self.calculated.time_left()):
                 outcomes = tuple(self.calculated.outcomes(name, cell.step, cell.address, worlds))
         except OutOfTimeError:
             return replace(cell, status=UNREADABLE, words=f"{GIVEN_UP}calculating takes too long")
@@ -283,7 +298,7 @@ class Judge:
             fingerprint = self._typed_fingerprint(name, group) if typed else ""
             return culprit.status, culprit.words or PLAIN_WORDS[culprit.status], fingerprint
         if _numbers_in_disguise(rest):
-            return TYPED, "another number stands in every row; it moves with no parameter", ""
+            return TYPED, "another number stands in every row, in the place of one formula", ""
         if culprit.words:
             return WRONG, culprit.words, ""
         return self._diagnosis.of(name, group, len(rest) > 1)
@@ -316,7 +331,7 @@ def _alike(cells: list[AnswerCell]) -> list[list[AnswerCell]]:
 def _may_be_known(cell: AnswerCell) -> bool:
     """Whether a spreadsheet engine may calculate what we cannot."""
     unknown = UNKNOWN.search(cell.words)
-    known = not unknown or unknown[1] in FORMULAE
+    known = not unknown or unknown[1] in FORMULAE or unknown[1] in NEWER
     return cell.status == UNREADABLE and known and not cell.words.startswith(GIVEN_UP)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from math import inf
 
 from kfsheet.coursework.judging.answer_rows import AnswerCell
@@ -44,7 +44,7 @@ class OwnWork:
         )
 
     def _circle(self, name: str, cell: AnswerCell) -> str:
-        if not self._calculated.needs(self._follows(name, cell), cell.address):
+        if not self._calculated.reads(self._follows(name, cell), cell.address):
             return ""
         # Who reads the analysis for the innovation may have written the analysis without it.
         if self._calculated.works(name, cell.step, cell.address):
@@ -53,6 +53,35 @@ class OwnWork:
             circle_in_words(self._book, cell.address)
             or "it goes in a circle: it needs its own result"
         )
+
+    def circles(self, right: Mapping[str, AnswerCell]) -> dict[str, str]:
+        """Words by name, for answers that are each right and lean on each other.
+
+        ``right`` has a cell of each answer. Whoever reads another one from which the key does not
+        follow in its row has closed the circle.
+        """
+        reads = {name: self._answers_read(name, cell, right) for name, cell in right.items()}
+        reached = {name: _reached(reads, name) for name in reads}
+        return {
+            name: f"it goes in a circle with {other}, which needs {name}"
+            for name in right
+            for other in sorted(reads[name])
+            if name in reached[other] and delays(self._model, other).get(name, inf) > 0
+        }
+
+    def _answers_read(
+        self, name: str, cell: AnswerCell, right: Mapping[str, AnswerCell]
+    ) -> set[str]:
+        """Other answers of the same row that a formula names, or names what follows from them."""
+        named = {
+            role for role, step in quantities_named(self._book, self._addresses, cell.address)
+            if step == cell.step or role not in self._model.table
+        }  # fmt: skip
+        return {
+            other
+            for other in right
+            if other != name and any(delays(self._model, other).get(n, inf) <= 0 for n in named)
+        }
 
     def _repeats(self, name: str, cell: AnswerCell) -> str:
         """Words, if the answer is a given quantity in other words."""
@@ -75,3 +104,14 @@ class OwnWork:
     def _needs(self, names: Collection[str], cell: AnswerCell) -> bool:
         """Whether an answer needs one of some columns and scalars."""
         return bool(names) and self._calculated.needs(lambda n, _: n in names, cell.address)
+
+
+def _reached(reads: Mapping[str, set[str]], name: str) -> set[str]:
+    """What a name leads to, over any number of steps."""
+    found: set[str] = set()
+    waiting = [name]
+    while waiting:
+        new = reads[waiting.pop()] - found
+        found |= new
+        waiting += new
+    return found

@@ -68,6 +68,7 @@ FORBIDDEN = frozenset(
     "EXEC SQL.REQUEST EVALUATE".split()
 )
 """Functions whose value is not the workbook's alone."""
+SIGNS = {"SINGLE": "@", "ANCHORARRAY": "#"}
 
 
 @lru_cache(maxsize=20_000)
@@ -263,6 +264,8 @@ class Compiler:
 
     def _call(self, name: str, *arguments: Tree) -> Program:
         name = name.upper().removeprefix("_XLFN.").removeprefix("_XLWS.")
+        if name in SIGNS and len(arguments) == 1:  # as Excel stores @A:A and A1#
+            return self._unary(SIGNS[name], *arguments)
         if name in FORBIDDEN:
             return _raising(ForbiddenError(f"{name} is not allowed"))
         if name not in FUNCTIONS:

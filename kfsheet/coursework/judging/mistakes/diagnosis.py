@@ -141,19 +141,20 @@ def _worth(outcomes: Sequence[Outcome]) -> str:
     # What is nearly equal in every run was rounded; it may be equal in the student's own by chance.
     if all(same(o.found, o.wanted, tolerance=ROUGH) for o in outcomes):
         return NEARLY
-    if _right([o for o in outcomes if o.world.own]):
-        return HARD_CODED
     seen = [o for o in outcomes if not o.world.gaps and o.wanted != ""]
     if _right(seen):
         return GAPS
+    if _right([o for o in outcomes if o.world.own]):
+        return HARD_CODED
     # Also in the student's own sheet, where a formula may be wrong that is right elsewhere.
     own = [o for o in seen if o.world.own_data]
-    return NEARLY if _mostly_close(seen) and _mostly_close(own) else WRONG
+    return NEARLY if _close(seen) > 3 / 4 and _close(own) > 1 / 2 else WRONG
 
 
-def _mostly_close(outcomes: Sequence[Outcome]) -> bool:
+def _close(outcomes: Sequence[Outcome]) -> float:
+    """Share of the values that are about right."""
     close = [same(o.found, o.wanted, tolerance=ROUGH) for o in outcomes]
-    return 4 * sum(close) > 3 * len(close)
+    return sum(close) / max(1, len(close))
 
 
 def _is_typed(outcomes: Sequence[Outcome]) -> bool:
