@@ -66,8 +66,15 @@ class OwnWork:
             name: f"it goes in a circle with {other}, which needs {name}"
             for name in right
             for other in sorted(reads[name])
-            if name in reached[other] and delays(self._model, other).get(name, inf) > 0
+            if name in reached[other] and self._leans(name, right[name], other)
         }
+
+    def _leans(self, name: str, cell: AnswerCell, other: str) -> bool:
+        """Whether an answer needs another one, or what follows from that, and the key does not."""
+        after = delays(self._model, other)
+        return after.get(name, inf) > 0 and self._calculated.reads(
+            lambda n, step: step - cell.step >= after.get(n, inf), cell.address
+        )
 
     def _answers_read(
         self, name: str, cell: AnswerCell, right: Mapping[str, AnswerCell]

@@ -147,7 +147,7 @@ def _worth(outcomes: Sequence[Outcome]) -> str:
     if _right([o for o in outcomes if o.world.own]):
         return HARD_CODED
     # Also in the student's own sheet, where a formula may be wrong that is right elsewhere.
-    own = [o for o in seen if o.world.own_data]
+    own = [o for o in outcomes if o.world.own_data and type(o.wanted) is float]
     return NEARLY if _close(seen) > 3 / 4 and _close(own) > 1 / 2 else WRONG
 
 
