@@ -301,13 +301,17 @@ def inlined(line, part, counts):
         return line.formula_at(part[1])
 
 
+WHOLE = re.compile(r"[A-Z]:\$?[A-Z]")  # a column, of which some cell may be empty
+
+
 def helped(line, part, counts):
     """A part in a helper cell, beside the table or on another sheet; or in a chain of them."""
     if part[0] in ("omitted", "number", "text", "truth") or len(line.helpers) > 3:
         return None
     # A cell that points to an empty one holds 0 in Excel, and nothing in LibreOffice.
-    if not is_number(part) and any(
-        line.course.may_be_empty(line.place(ref)) for ref in _refs(part)
+    if not is_number(part) and (
+        any(line.course.may_be_empty(line.place(ref)) for ref in _refs(part))
+        or any(tree[0] == "raw" and WHOLE.search(tree[1]) for _, tree, _ in places(part))
     ):
         return None
     elsewhere = line.dice.random() < 0.4

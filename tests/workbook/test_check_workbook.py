@@ -333,6 +333,10 @@ def test_a_sheet_or_a_name_that_is_gone_is_named(football_file, tmp_path):
         check_workbook(tmp_path / "renamed.xlsx", exercise)
     book = openpyxl.load_workbook(football_file)
     del book.defined_names["K_x"]
+    book.save(tmp_path / "labelled.xlsx")
+    assert check_workbook(tmp_path / "labelled.xlsx", exercise).problems  # formulas miss the name
+    label = next(cell for cell in book["Parameters"]["A"] if cell.value == "K_x")
+    label.value = "gain"
     book.save(tmp_path / "nameless.xlsx")
     with pytest.raises(WorkbookError, match="no cell is named K_x"):
         check_workbook(tmp_path / "nameless.xlsx", exercise)

@@ -174,7 +174,9 @@ class Container:
         found = next(filter(None, map(self.find, [*links, START])), None)
         if found is None or not plain_name(found).endswith(".xml"):
             words = "the file is a zip, but no Excel workbook (.xlsx)"
-            raise UnreadableFileError("wrong kind", f"{words}; if it holds submissions, unpack it")
+            raise UnreadableFileError(
+                "wrong kind", f"{words}; if it holds submissions, unpack it first"
+            )
         return found
 
     @cached_property
