@@ -301,7 +301,9 @@ def inlined(line, part, counts):
         return line.formula_at(part[1])
 
 
-WHOLE = re.compile(r"[A-Z]:\$?[A-Z]")  # a column, of which some cell may be empty
+def is_whole(line, text):
+    """Whether a text stands for a column, of which some cell may be empty."""
+    return text in line.course.column_names.values() or re.search(r"[A-Z]:\$?[A-Z]", text)
 
 
 def helped(line, part, counts):
@@ -311,7 +313,7 @@ def helped(line, part, counts):
     # A cell that points to an empty one holds 0 in Excel, and nothing in LibreOffice.
     if not is_number(part) and (
         any(line.course.may_be_empty(line.place(ref)) for ref in _refs(part))
-        or any(tree[0] == "raw" and WHOLE.search(tree[1]) for _, tree, _ in places(part))
+        or any(tree[0] == "raw" and is_whole(line, tree[1]) for _, tree, _ in places(part))
     ):
         return None
     elsewhere = line.dice.random() < 0.4
