@@ -74,7 +74,8 @@ class Rearrangements:
 
     def strangers(self, name: str) -> list[str]:
         """Given columns and scalars on which an answer does not build."""
-        return [n for n in self.given if n not in self.ancestors(name)]
+        built_on = self.ancestors(name)
+        return [n for n in self.given if n not in built_on]
 
     def found(self, name: str) -> dict[str, bool]:
         """Given quantities from which an answer follows; whether it does from them alone."""
