@@ -10,6 +10,7 @@ from kfsheet.errors import ModelError
 from kfsheet.model.chart import Chart
 from kfsheet.model.expressions import Missing
 from kfsheet.model.recurrence import Recurrence
+from kfsheet.printing.sentence import Verdict
 
 if TYPE_CHECKING:
     from numpy.random import RandomState
@@ -88,7 +89,7 @@ class Exercise:
     """
 
     model: Recurrence
-    about: tuple[str, ...]
+    about: tuple[str | Verdict, ...]
     source: str
     charts: tuple[Chart, ...] = ()
     questions: tuple[Question, ...] = ()
@@ -107,7 +108,7 @@ class Exercise:
 
     def __post_init__(self) -> None:
         for name, kind in (
-            ("about", str),
+            ("about", str | Verdict),
             ("task", str),
             ("alarm", str),
             ("charts", Chart),
@@ -116,13 +117,16 @@ class Exercise:
             given = getattr(self, name)
             if not isinstance(given, tuple) or not all(isinstance(item, kind) for item in given):
                 raise ModelError(
-                    f"{self.name}: {name} is {given!r:.60}; give a tuple of {kind.__name__}, "
-                    "with a comma even after a single one"
+                    f"{self.name}: {name} is {given!r:.60}; give a tuple of "
+                    f"{getattr(kind, '__name__', 'str')}, with a comma even after a single one"
                 )
         # What charts and questions name can be looked up only in a model that is complete.
         self.model.validate()
         for chart in self.charts:
             chart.check(self.model)
+        for sentence in self.about:
+            if isinstance(sentence, Verdict):
+                sentence.check(self.model.scalars(), self.name)
         for question in self.questions:
             self._check_question(question)
         if self.greyed:
