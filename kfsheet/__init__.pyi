@@ -55,6 +55,7 @@ from .model.tables import read_table as read_table
 from .printing.excel import excel_code as excel_code
 from .printing.latex import latex_code as latex_code
 from .printing.python import python_code as python_code
+from .printing.sentence import Verdict as Verdict
 from .workbook.check.check_workbook import check_workbook as check_workbook
 from .workbook.engines.recalculate import recalculate as recalculate
 from .workbook.write.write_workbook import write_workbook as write_workbook

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from kfsheet.errors import ModelError
+from kfsheet.printing.sentence import Verdict
 
 if TYPE_CHECKING:
     from kfsheet.model.recurrence import Recurrence
@@ -72,8 +73,8 @@ class Chart:
         Of the axes, with units, as in ``"time (s)"``.
     series : tuple of Series
         What is drawn, the last on top.
-    note : str
-        The sentence above it: what to look for.
+    note : str or Verdict
+        The sentence above it: what to look for, or what is to be seen in the run.
     origin_top_left : bool
         Whether y grows downwards, as in a photo.
     y_limits : tuple of (lowest, highest), optional
@@ -86,7 +87,7 @@ class Chart:
     x_label: str
     y_label: str
     series: tuple[Series, ...]
-    note: str = ""
+    note: str | Verdict = ""
     origin_top_left: bool = False
     y_limits: tuple[float, float] | None = None
     where: str = ""
@@ -97,6 +98,8 @@ class Chart:
             raise ModelError(f"chart {self.title!r}: series must be a tuple of at least one Series")
         if self.where:
             model.column(self.where)
+        if isinstance(self.note, Verdict):
+            self.note.check(model.scalars(), model.name)
         for series in self.series:
             model.column(series.x), model.column(series.y)
             if series.role not in LOOKS:

@@ -12,6 +12,7 @@ from kfsheet.errors import ModelError
 from kfsheet.model.chart import Chart
 from kfsheet.model.expressions import Missing, columns_read, scalars
 from kfsheet.model.recurrence import Recurrence
+from kfsheet.printing.sentence import Verdict
 
 if TYPE_CHECKING:
     from numpy.random import RandomState
@@ -92,7 +93,7 @@ class Exercise:
     """
 
     model: Recurrence
-    about: tuple[str, ...]
+    about: tuple[str | Verdict, ...]
     source: str
     charts: tuple[Chart, ...] = ()
     questions: tuple[Question, ...] = ()
@@ -111,7 +112,7 @@ class Exercise:
 
     def __post_init__(self) -> None:
         for name, kind in (
-            ("about", str),
+            ("about", str | Verdict),
             ("task", str),
             ("alarm", str),
             ("charts", Chart),
@@ -120,13 +121,16 @@ class Exercise:
             given = getattr(self, name)
             if not isinstance(given, tuple) or not all(isinstance(item, kind) for item in given):
                 raise ModelError(
-                    f"{self.name}: {name} is {given!r:.60}; give a tuple of {kind.__name__}, "
-                    "with a comma even after a single one"
+                    f"{self.name}: {name} is {given!r:.60}; give a tuple of "
+                    f"{getattr(kind, '__name__', 'str')}, with a comma even after a single one"
                 )
         # What charts and questions name can be looked up only in a model that is complete.
         self.model.validate()
         for chart in self.charts:
             chart.check(self.model)
+        for sentence in self.about:
+            if isinstance(sentence, Verdict):
+                sentence.check(self.model.scalars(), self.name)
         for question in self.questions:
             self._check_question(question)
         if self.greyed:
@@ -171,14 +175,17 @@ class Exercise:
         """One line for people."""
         return self.model.title
 
-    def story(self, values: Mapping[str, float]) -> tuple[str, ...]:
+    def story(self, values: Mapping[str, float]) -> tuple[str | Verdict, ...]:
         """The paragraphs of ``about`` with the values of a run's parameters in them."""
 
         def value(match: re.Match[str]) -> str:
             name = match[1]
             return f"{values[name]:.10g}" if name in self.model.parameters else match[0]
 
-        return tuple(re.sub(r"\{(\w+)\}", value, paragraph) for paragraph in self.about)
+        return tuple(
+            sentence if isinstance(sentence, Verdict) else re.sub(r"\{(\w+)\}", value, sentence)
+            for sentence in self.about
+        )
 
     @cached_property
     def waiting(self) -> frozenset[str]:

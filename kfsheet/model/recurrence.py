@@ -261,7 +261,7 @@ class Recurrence:
         """Symbol of a scalar or base of a column: ``m["dt"]``; of several: ``m["dt", "x_a"]``."""
         if isinstance(names, tuple):
             return tuple(self[name] for name in names)
-        scalar = self._scalars().get(names)
+        scalar = self.scalars().get(names)
         return scalar.symbol if scalar else self.column(names).base
 
     __iter__ = None  # a recurrence has no order of its own: see table, sections, parameters
@@ -374,24 +374,25 @@ class Recurrence:
 
     def _check_scalar_name(self, name: str) -> None:
         problem = name_problem(name) or excel_name_problem(name) or self._taken(name)
-        twins = {other for other in self._scalars() if other.lower() == str(name).lower()}
+        twins = {other for other in self.scalars() if other.lower() == str(name).lower()}
         if twins and not problem:
             problem = f"Excel does not tell it from {twins.pop()}: names ignore capitals"
         if problem:
             raise ModelError(f"name {name!r}: {problem}")
 
-    def _scalars(self) -> dict[str, Parameter | Scalar]:
+    def scalars(self) -> dict[str, Parameter | Scalar]:
+        """Parameters, derived scalars and summaries, by name."""
         return {**self.parameters, **self.derived_scalars, **self.summaries}
 
     def _own_headers(self) -> set[str]:
         return {"time", self.step, *self._steps.values()}
 
     def _taken(self, name: str) -> str | None:
-        taken = name in self._scalars() or name in self.table or name in self._own_headers()
+        taken = name in self.scalars() or name in self.table or name in self._own_headers()
         return "the name is taken" if taken else None
 
     def _checked(self, name: str, expression: Expr) -> Expr:
-        known: set[Basic] = {t, *(s.symbol for s in self._scalars().values())}
+        known: set[Basic] = {t, *(s.symbol for s in self.scalars().values())}
         known |= {c.base for c in self.all_columns()}
         expression = validation.checked_expression(name, expression)
         validation.check_symbols(name, expression, known)

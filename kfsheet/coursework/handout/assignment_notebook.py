@@ -21,6 +21,7 @@ from kfsheet.files import write_file
 from kfsheet.model.exercise import Exercise, Question
 from kfsheet.model.expressions import lag, t
 from kfsheet.printing.python import python_code
+from kfsheet.printing.sentence import words_of
 
 POINTS_SHOWN, POINTS_HIDDEN = 1, 4
 BEGIN, END = "### BEGIN SOLUTION", "### END SOLUTION"
@@ -62,10 +63,10 @@ def assignment(exercise: Exercise, *, solved: bool) -> Any:
     if not exercise.questions:
         raise ModelError(f"{exercise.name} asks no questions; list them in Exercise(questions=...)")
     runs = ModelRuns(exercise)
+    values = runs.base.scalars
+    about = [words_of(sentence, values) for sentence in exercise.story(values)]
     cells = [
-        v4.new_markdown_cell(
-            "\n\n".join([f"# {exercise.title}", *exercise.story(exercise.model.defaults())])
-        ),
+        v4.new_markdown_cell("\n\n".join([f"# {exercise.title}", *about])),
         v4.new_code_cell(START),
         *(cell for question in exercise.questions for cell in _cells(runs, question)),
     ]

@@ -11,6 +11,8 @@ those numbers have. The tolerance is 1e-12, and 1e-11 for LibreOffice, which sto
 from __future__ import annotations
 
 import math
+import re
+from decimal import Decimal
 from functools import cached_property
 from typing import Any
 
@@ -26,6 +28,25 @@ from kfsheet.workbook.write.sheet import Cell, Sheet, is_formula
 from kfsheet.workbook.write.write_workbook import compose
 
 TOLERANCES = {"ironcalc": 1e-12, "own": 1e-12, "libreoffice": 1e-11}
+
+
+NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?")
+
+
+def same_words(expected: Any, found: Any) -> bool:
+    """Whether two texts are one sentence: programs may round a number in it the other way."""
+    if not (isinstance(expected, str) and isinstance(found, str)) or expected == found:
+        return expected == found
+    if NUMBER.sub("#", expected) != NUMBER.sub("#", found):
+        return False
+    pairs = zip(NUMBER.findall(expected), NUMBER.findall(found), strict=True)
+    return all(abs(float(a) - float(b)) <= 1.01 * _last_place(a) for a, b in pairs)
+
+
+def _last_place(figures: str) -> float:
+    """What one more in the last figure is worth."""
+    exponent = Decimal(figures).as_tuple().exponent
+    return 10.0**exponent if exponent < 0 else 0.0
 
 
 class Comparison:
@@ -119,7 +140,9 @@ class Comparison:
         if isinstance(expected, str) or expected is None:
             # A column without a value is an empty text; a mean of nothing is an error.
             broken = _is_error(found) and not expected and address[0] in self._layout.columns
-            return (not broken and _no_number(expected) and _no_number(found)) or expected == found
+            if not broken and _no_number(expected) and _no_number(found):
+                return True
+            return same_words(expected, found)
         if math.isnan(number(found)):
             return False
         size = max(abs(expected), 0 if math.isnan(scale) else scale) or 1.0

@@ -16,6 +16,7 @@ from kfsheet.model.exercise import Exercise
 from kfsheet.model.expressions import Missing, columns_read
 from kfsheet.model.quantities import Column
 from kfsheet.model.unit_text import pretty_unit
+from kfsheet.printing.sentence import Verdict, excel_sentence, words_of
 from kfsheet.workbook.write.layout import (
     EXERCISE_NAME,
     FIRST_ROW,
@@ -151,7 +152,7 @@ def charts_sheet(exercise: Exercise, layout: Layout, now: Run) -> Sheet:
     sheet = Sheet("Charts")
     sheet.put(1, 1, exercise.title, "title")
     for number, chart in enumerate(exercise.charts):
-        sheet.put(*chart_place(number), Words(chart.note), "note")
+        sheet.cells[chart_place(number)] = sentence_cell(chart.note, now, "note")
     names = helper_columns(exercise, layout.waiting)
     if names:
         sheet.put(2, 1, "Helper columns for the charts stand from AA on.")
@@ -198,15 +199,24 @@ def chart_range(exercise: Exercise, layout: Layout, name: str, where: str = "") 
 CHARACTERS_A_LINE = 130  # of the two columns of "Read me" together
 
 
-def readme_sheet(exercise: Exercise, built: Run) -> Sheet:
+def sentence_cell(sentence: str | Verdict, now: Run, kind: str, align: str = "") -> Cell:
+    """Words, or a formula that is a sentence."""
+    if isinstance(sentence, str):
+        return Cell(Words(sentence), kind, align=align)
+    words = sentence.words(now.scalars)
+    return Cell(excel_sentence(sentence.pieces()), kind, words, align=align)
+
+
+def readme_sheet(exercise: Exercise, now: Run, built: Run) -> Sheet:
     """The first worksheet: what this is, how to use it, what the colours mean."""
     sheet = Sheet("Read me", widths={1: 22, 2: 100})
     sheet.put(1, 1, exercise.title, "title")
     row = 3
     for paragraph in exercise.story(built.scalars):
-        sheet.put(row, 1, Words(paragraph), "text", align="wrap")
+        sheet.cells[row, 1] = sentence_cell(paragraph, now, "text", "wrap")
         sheet.merges.append(f"A{row}:B{row}")
-        sheet.heights[row] = 16 * (1 + len(paragraph) // CHARACTERS_A_LINE) + 4
+        length = len(words_of(paragraph, now.scalars))
+        sheet.heights[row] = 16 * (1 + length // CHARACTERS_A_LINE) + 4
         row += 1
     row = _block(sheet, row + 1, "Colours", [(w, k, k) for k, w in LEGEND.items()])
     sheets = {"Parameters": "what you can change, and what follows: gains, errors, results"}

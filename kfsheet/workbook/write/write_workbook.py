@@ -75,7 +75,7 @@ def compose(exercise: Exercise, layout: Layout, now: Run, built: Run) -> list[Sh
     """Every worksheet, in order, for the run ``now`` of a workbook built from the run ``built``."""
     sections = [section_sheet(layout, section, now) for section in exercise.model.sections]
     return [
-        readme_sheet(exercise, built),
+        readme_sheet(exercise, now, built),
         parameters_sheet(layout, now),
         *sections,
         charts_sheet(exercise, layout, now),
