@@ -44,9 +44,9 @@ def draw_scene(ax: Axes, shot: Shot, impact: ArrayLike) -> None:
         ax.annotate("", end, place[:2], arrowprops=arrow)
         ax.plot(*place[:2], "s", ms=9, color="tab:blue")
         ax.text(place[0] + where[0], place[1] + where[1], name, color="tab:blue")
-    ax.annotate("", x[20, :2] + [0, 0.7], x[0, :2], arrowprops={"arrowstyle": "->"})
-    ax.text(x[20, 0] + 0.2, x[20, 1] + 0.6, "V")
-    ax.text(x[0, 0] - 0.5, x[0, 1] + 0.45, "X")
+    ax.annotate("", x[20, :2] + [0, 0.4], x[0, :2] + [0, 0.4], arrowprops={"arrowstyle": "->"})
+    ax.text(x[20, 0] + 0.2, x[20, 1] + 0.3, "V")
+    ax.text(x[0, 0] - 0.5, x[0, 1] + 0.3, "X")
     ax.text(x[70, 0], x[70, 1] + 0.35, "$c_D$, $\\Omega$, $g$ bend it", color="0.35")
     ax.set(xlabel="$x_1$: away from camera 1 (m)", ylabel="$x_2$: away from camera 2 (m)")
     ax.set_ylim(-0.9, max(8.5, float(impact[1]) + 1.5))
@@ -82,9 +82,19 @@ def draw_spread(
         if theory and name in theory:
             ax.plot(n + 0.44, theory[name], "o", mfc="none", mec="tab:red", ms=8)
     ax.set_yscale("log")
+    _plain_numbers(ax)
     ax.set_xticks(range(len(spreads)), list(spreads))
     ax.set_ylabel(unit)
     ax.grid(alpha=0.3, axis="y", which="both")
+
+
+def _plain_numbers(ax: Axes) -> None:
+    """1, 2, 5, 10 along the logarithmic axis instead of powers."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    ax.yaxis.set_major_formatter("{x:g}")
+    ax.yaxis.set_minor_formatter(NullFormatter())
 
 
 def draw_values(ax: Axes, values: Mapping[str, float], unit: str) -> None:

@@ -179,7 +179,7 @@ def test_blur_moves_the_centroid_by_half_the_way_from_the_begin_and_nothing_from
     assert from_begin == pytest.approx(mean - seen[0], abs=1e-4)
 
 
-def test_at_67_microseconds_the_begin_of_an_exposure_is_a_pixel_error_off():
+def test_at_70_microseconds_the_begin_of_an_exposure_is_a_pixel_error_off():
     speed = np.linalg.norm(light.pixel_velocity(A.scene.camera_2, A.scene.ball, 0.08))
     assert 2 * SIGMA / speed == pytest.approx(7e-5, rel=0.1)
 

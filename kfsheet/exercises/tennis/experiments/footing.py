@@ -47,6 +47,26 @@ def path_rms(shot: Shot, views: Sequence[View], **known: Any) -> Array:
     return np.sqrt(variance.mean(axis=1))
 
 
+def worth(shot: Shot) -> dict[str, float]:
+    """What cameras, clocks, a shadow and known quantities are worth: rms of the depth x1, mm."""
+    both, shadow = views_of(shot), shadow_of(shot)
+    drag = {"kappa": shot.scene.ball.kappa}
+    cases = {
+        "two cameras": (both, {}),
+        "the same, photos in turns, at known times": (between(shot), {}),
+        "the same, clock of camera 2 unknown": (with_clock(shot, None), {}),
+        "two cameras and a shadow": ([*both, shadow], {}),
+        "two cameras, drag known": (both, drag),
+        "one camera, drag and g known": (both[:1], drag),
+        "one camera, spin known as well": (both[:1], {**drag, "spin": shot.scene.ball.spin}),
+        "one camera and a shadow": ([both[0], shadow], {}),
+    }
+    return {
+        what: 1e3 * float(path_rms(shot, views, **known)[0])
+        for what, (views, known) in cases.items()
+    }
+
+
 def drawn(views: Sequence[View], ball: Ball, seed: int, sigma: float = SIGMA) -> list[View]:
     """The same views of the ball, with errors of ``sigma`` pixels."""
     dice = np.random.RandomState(seed)

@@ -11,7 +11,7 @@ from kfsheet.exercises.tennis.methods.cameras import ANGLE, PIXELS, Camera
 
 
 def crossing_errors(
-    apex: ArrayLike, distance: float = 7.0, sigma: float = ANGLE / PIXELS
+    apex: ArrayLike, distance: ArrayLike = 7.0, sigma: float = ANGLE / PIXELS
 ) -> tuple[Array, Array]:
     """How well two lines of sight tell where they cross, in the plane of the cameras.
 
@@ -25,7 +25,7 @@ def crossing_errors(
     ----------
     apex : array_like
         Angle at the ball between both cameras, rad, between 0 and pi.
-    distance : float
+    distance : array_like
         Of each camera to the ball, m.
     sigma : float
         Error of an angle, rad.
@@ -44,7 +44,9 @@ def crossing_errors(
     apex = np.asarray(apex, float)
     if not ((apex > 0) & (apex < np.pi)).all():
         raise DataError("apex must lie between 0 and pi: there the lines of sight do not cross")
-    d = number("distance", distance, 0) * number("sigma", sigma, 0)
+    d = np.asarray(distance, float) * number("sigma", sigma, 0)
+    if not (d > 0).all():
+        raise DataError("distance must be above 0")
     return d / np.sqrt(1 - np.cos(apex)), d / np.sqrt(1 + np.cos(apex))
 
 
