@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kfsheet.exercises.tennis.methods.dynamics import Ball, impact
 from kfsheet.exercises.tennis.methods.shots import Shot
 
 if TYPE_CHECKING:
@@ -114,3 +115,23 @@ def draw_values(ax: Axes, values: Mapping[str, float], unit: str) -> None:
     ax.margins(x=0.15, y=0.08)
     ax.set_xlabel(unit)
     ax.grid(alpha=0.3, which="both")
+
+
+def draw_before_after(ax: Axes, before: ArrayLike, after: ArrayLike) -> None:
+    """Spreads of (draws, 3) rms errors of the coordinates, two columns for each, mm."""
+    both = {"first": np.asarray(before), "after": np.asarray(after)}
+    columns = {f"x{k + 1} {what}": e[:, k] for k in range(3) for what, e in both.items()}
+    draw_spread(ax, columns)
+
+
+def draw_foretold(ax: Axes, shot: Shot, ball: Ball, images: int) -> None:
+    """Side view of a flight foretold from the first images, beside the truth; its miss as title."""
+    time, x = impact(ball)
+    true, path = impact(shot.scene.ball)[1], ball.fly(np.linspace(0, time, 50))
+    ax.plot(*shot.truth[:, [0, 2]].T, "0.6", lw=4, label="truth")
+    ax.plot(path[:, 0], path[:, 2], "--", label=f"foretold from {images} images")
+    ax.plot(shot.truth[:images, 0], shot.truth[:images, 2], ".", color="k", ms=3, label="seen")
+    ax.plot(true[0], true[2], "x", color="tab:red", ms=10, label="true impact")
+    ax.set(xlabel="x1 (m)", ylabel="height x3 (m)", title=f"misses by {x[0] - true[0]:.2f} m")
+    ax.grid(alpha=0.3)
+    ax.legend()

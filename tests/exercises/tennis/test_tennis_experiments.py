@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from kfsheet.errors import DataError
-from kfsheet.exercises.tennis import read_drive, read_toss
+from kfsheet.exercises.tennis import pictures, read_drive, read_toss
 from kfsheet.exercises.tennis.experiments import lens, light, placing, regimes, tuning
 from kfsheet.exercises.tennis.methods import loop
 from kfsheet.exercises.tennis.methods.cameras import FOCAL_LENGTH, triangulate
 from kfsheet.exercises.tennis.methods.centroid import centroid
 from kfsheet.exercises.tennis.methods.closed_form import closed_form
+from kfsheet.exercises.tennis.methods.dynamics import impact
 from kfsheet.exercises.tennis.methods.reprojection import fit_pixels
 from kfsheet.exercises.tennis.methods.shots import SIGMA, TRUE_DRAG, simulate
 
@@ -207,7 +208,7 @@ def test_across_the_line_of_sight_accuracy_decays_linearly_and_in_depth_with_the
 # -- regimes (3.5.1, 3.5.2) -----------------------------------------------------------------------
 
 
-def test_the_slow_laws_are_out_by_a_thousand_and_the_fast_ones_fit():
+def test_the_slow_laws_are_out_by_hundreds_and_the_fast_ones_fit():
     for shot in SHOTS.values():
         speed = np.linalg.norm(shot.scene.ball.V)
         assert regimes.reynolds(speed) > 4e4
@@ -291,3 +292,30 @@ def test_point_errors_are_those_of_draws():
     found = tuning.point_errors(A)[A.overlap]
     scatter = np.std([simulate(A, k).triangulated()[A.overlap] for k in range(300)], axis=0)
     np.testing.assert_allclose(found, scatter, rtol=0.15)
+
+
+# -- pictures -----------------------------------------------------------------------------------
+
+
+def test_the_sketch_shows_both_cameras_the_overlap_and_the_impact():
+    plt = pytest.importorskip("matplotlib.pyplot")
+    _, ax = plt.subplots()
+    pictures.draw_scene(ax, A, impact(A.scene.ball)[1])
+    words = {text.get_text() for text in ax.texts}
+    assert {"X", "V", "camera 1, 101 images", "camera 2, 8 images"} <= words
+    seen = next(line for line in ax.lines if str(line.get_label()).startswith("images 5"))
+    assert len(seen.get_xdata()) == len(A.overlap)
+    plt.close()
+
+
+def test_a_spread_shows_a_dot_for_each_draw_and_a_bar_at_the_root_mean_square():
+    plt = pytest.importorskip("matplotlib.pyplot")
+    _, ax = plt.subplots()
+    pictures.draw_spread(ax, {"a": [3.0, 4.0, 5.0], "b": [1.0, 1.0]}, {"a": 4.2})
+    dots, bar, ring, *_ = ax.lines
+    assert dots.get_ydata().tolist() == [3, 4, 5]
+    assert bar.get_ydata()[0] == pytest.approx(np.sqrt(50 / 3))
+    assert ring.get_ydata() == pytest.approx([4.2])
+    pictures.draw_values(ax, {"much": 1234.0, "little": 1.26}, "mm")
+    assert {"1,234", "1.3"} <= {text.get_text() for text in ax.texts}
+    plt.close()

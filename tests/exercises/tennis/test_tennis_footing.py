@@ -20,6 +20,7 @@ from kfsheet.exercises.tennis.experiments.footing import (
     photographs,
     shadow_of,
     with_clock,
+    worth,
 )
 from kfsheet.exercises.tennis.methods.dynamics import Ball
 from kfsheet.exercises.tennis.methods.reprojection import fit_pixels, fit_views, leverage
@@ -234,3 +235,14 @@ def test_eliminated_distances_are_those_that_an_optimiser_finds():
     ours = fit_with_distances(shot, weigh=False, **DRAG)
     np.testing.assert_allclose(found[:3], ours.X, atol=2e-5)
     np.testing.assert_allclose(found[3:6], ours.V, atol=5e-4)
+
+
+# -- what the notebook's picture says ------------------------------------------------------------
+
+
+def test_what_a_piece_of_knowledge_is_worth(shot):
+    both, turns, unknown, shadow, drag, one, spin, one_shadow = worth(shot).values()
+    assert abs(turns / both - 1) < 0.07
+    assert 1 < unknown / both < 1.2
+    assert max(shadow, drag, one_shadow) < both / 6
+    assert spin < both / 2 < both * 5 < one
