@@ -8,6 +8,7 @@ from dataclasses import replace
 from kfsheet.coursework.handout.questions_sheet import SHEET
 from kfsheet.coursework.handout.shown_answers import shown_answers
 from kfsheet.model.exercise import Exercise, asked_steps
+from kfsheet.printing.sentence import Verdict
 from kfsheet.workbook.write.layout import FIRST_ROW, WORDS_ROW, Layout
 from kfsheet.workbook.write.run import Run
 from kfsheet.workbook.write.sheet import Cell, Sheet
@@ -50,20 +51,25 @@ def _in_own_words(exercise: Exercise, now: Run) -> Exercise:
     about = (YOURS, *_still_true(exercise, now))
     # What stands below a chart with a number in it was seen in the exercise's own run.
     charts = tuple(
-        replace(chart, note="") if re.search(r"\d", chart.note) else chart
+        replace(chart, note="")
+        if not isinstance(chart.note, Verdict) and re.search(r"\d", chart.note)
+        else chart
         for chart in exercise.charts
     )
     return replace(exercise, about=about, charts=charts, notebook="")
 
 
-def _still_true(exercise: Exercise, now: Run) -> list[str]:
+def _still_true(exercise: Exercise, now: Run) -> list[str | Verdict]:
     """The story, without sentences that tell the exercise's value of a parameter that differs."""
     others = {
         f"{parameter.value:.10g}"
         for name, parameter in exercise.model.parameters.items()
         if parameter.value != now.scalars[name]
     }
-    sentences = re.split(r"(?<=[.!?])\s+", exercise.about[0]) if exercise.about else []
+    first = exercise.about[0] if exercise.about else ""
+    if isinstance(first, Verdict):  # its numbers are the student's own
+        return [first]
+    sentences = re.split(r"(?<=[.!?])\s+", first) if first else []
     numbers = r"(?<![\w.{])\d+(?:\.\d+)?(?![\w}])"
     kept = [s for s in sentences if not others & set(re.findall(numbers, s))]
     return [" ".join(kept)] if kept else []

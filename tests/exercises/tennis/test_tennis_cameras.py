@@ -23,6 +23,7 @@ from kfsheet.exercises.tennis.methods.cameras import (
     triangulate_weighted,
 )
 from kfsheet.exercises.tennis.methods.shots import DRIVE, TOSS, simulate
+from kfsheet.exercises.tennis.methods.symbolic import diamond_from_lines
 
 EPS = 8.4e-4
 
@@ -77,6 +78,16 @@ def test_the_proof_of_the_report_loses_a_minus_and_argues_from_the_wrong_term():
     # -sin(2 theta)/2 is negative on all of (0, pi/2), yet beyond 45 degrees the quotient grows.
     later = {a: pi / 3, e: Rational(1, 1000)}
     assert (-sin(2 * a) / 2).subs(later) < 0 < slope.subs(later)
+
+
+def test_the_two_lines_of_the_report_lead_to_the_diagonal():
+    """Its printed corner and quotient, from its two lines; and the sine form that is used here."""
+    a, e, m = symbols("theta epsilon m", positive=True)
+    corner, diagonal = diamond_from_lines(a, e, m)
+    assert simplify(corner - 2 * m * tan(a - e) / (tan(a) + tan(a - e))) == 0
+    printed = 2 * m * (tan(a) - tan(a - e)) / (tan(a) + tan(a - e))
+    assert simplify(diagonal - printed) == 0
+    assert simplify((printed - 2 * m * sin(e) / sin(2 * a - e)).rewrite(exp)) == 0
 
 
 def test_by_rms_the_best_apex_is_109_5_degrees():

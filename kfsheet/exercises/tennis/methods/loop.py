@@ -123,7 +123,7 @@ def _vector(ball: Ball, fit_g: bool) -> Array:
     return vector if fit_g else vector[:-1]
 
 
-def _positions(times: Array, vectors: Array, known_g: float) -> Array:
+def positions_of(times: Array, vectors: Array, known_g: float) -> Array:
     """(3.5) for vectors of scaled parameters: (..., 3n), image by image.
 
     Vectors (..., 11) end with g; vectors (..., 10) leave it out, and ``known_g`` holds.
@@ -134,7 +134,7 @@ def _positions(times: Array, vectors: Array, known_g: float) -> Array:
     return x.reshape(*p.shape[:-1], -1)
 
 
-def _derivative(function: Callable[[Array], Array], p: Array) -> Array:
+def derivative(function: Callable[[Array], Array], p: Array) -> Array:
     """Central differences of a function that takes many vectors at once."""
     step = STEP * np.eye(len(p))
     ahead, behind = np.split(function(np.concatenate([p + step, p - step])), 2)
@@ -156,10 +156,10 @@ def fit_closed_form(times: Array, x: Array, w: Array, start: Ball, *, fit_g: boo
     root = np.repeat(np.sqrt(w), 3)
 
     def residuals(p: Array) -> Array:
-        return (_positions(times, p, start.g) - x.ravel()) * root
+        return (positions_of(times, p, start.g) - x.ravel()) * root
 
     def jacobian(p: Array) -> Array:
-        return _derivative(lambda many: _positions(times, many, start.g), p) * root[:, None]
+        return derivative(lambda many: positions_of(times, many, start.g), p) * root[:, None]
 
     p = _vector(start, fit_g)
     p = least_squares(residuals, p, jacobian, method="lm", xtol=1e-12, ftol=1e-12).x
@@ -172,6 +172,8 @@ def iterate(
     *,
     radius: float = 0.6,
     g: float = GRAVITY,
+    start: Ball | None = None,
+    weigh: Callable[[Shot, Array], Array] = weights,
     fit_g: bool = True,
     limit: int = 20,
     g_tolerance: float = 0.0,
@@ -187,6 +189,10 @@ def iterate(
         Of the error cones, px.
     g : float
         Gravity of the first estimate, m/s2; afterwards it is fitted.
+    start : Ball, optional
+        Another first estimate; by default that of section 3.6.1.
+    weigh : callable
+        What :func:`weights` are to be replaced by, with the same arguments.
     fit_g : bool
         False keeps ``g`` as it is, in all turns: the report's loop without its freedom of scale.
     limit : int
@@ -204,11 +210,11 @@ def iterate(
     if not isinstance(limit, int) or limit < 1:
         raise DataError(f"limit is {limit!r}; give a whole number of turns from 1 up")
     number("g_tolerance", g_tolerance, -1), number("stable", stable, -1)
-    ball, turns, reason = first_estimate(shot, g), [], "limit"
+    ball, turns, reason = start or first_estimate(shot, g), [], "limit"
     for n in range(limit + 1):
         if turns:
             believed = turns[-1].pseudo
-            ball = fit_closed_form(shot.times, believed, weights(shot, believed), ball, fit_g=fit_g)
+            ball = fit_closed_form(shot.times, believed, weigh(shot, believed), ball, fit_g=fit_g)
         x = closed_form(shot.times, ball.X, ball.V, ball.kappa, ball.spin, ball.g)
         moved = np.sqrt(np.mean((x - turns[-1].x) ** 2)) if turns else np.inf
         turns.append(Iteration(n, ball, x, into_cones(shot, x, radius), float(moved)))
@@ -267,7 +273,7 @@ def _turn(shot: Shot, ball: Ball, fit_g: bool) -> tuple[Array, Array]:
     both, seen = shot.overlap, shot.triangulated()
 
     def positions(vectors: Array) -> Array:
-        return _positions(shot.times, vectors, ball.g)
+        return positions_of(shot.times, vectors, ball.g)
 
     def believed(vectors: Array) -> Array:
         x = positions(vectors).reshape(len(vectors), -1, 3)
@@ -277,5 +283,5 @@ def _turn(shot: Shot, ball: Ball, fit_g: bool) -> tuple[Array, Array]:
 
     p = _vector(ball, fit_g)
     root = np.repeat(np.sqrt(weights(shot, positions(p).reshape(-1, 3))), 3)[:, None]
-    J, D = _derivative(positions, p), _derivative(believed, p)
+    J, D = derivative(positions, p), derivative(believed, p)
     return J, np.linalg.lstsq(J * root, D * root, rcond=None)[0]

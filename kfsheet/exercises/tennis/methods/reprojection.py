@@ -5,22 +5,20 @@ No depth is invented for a photo that one camera alone took: each pixel is one e
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 from kfsheet.errors import DataError
-from kfsheet.exercises.tennis.methods.arguments import Array, array, number
-from kfsheet.exercises.tennis.methods.dynamics import GRAVITY, MASS, TEXTBOOK_DRAG, Ball, flights
+from kfsheet.exercises.tennis.methods.arguments import Array, number
+from kfsheet.exercises.tennis.methods.dynamics import GRAVITY, MASS, TEXTBOOK_DRAG, Ball
 from kfsheet.exercises.tennis.methods.shots import SIGMA, Shot
+from kfsheet.exercises.tennis.methods.views import Pixels, View, start_from_lines, views_of
 
-SPINS = {"none": 0, "across": 2, "full": 3}
-"""Free components of lambda: none; the two across V, as the report advises; all three."""
-SCALES = {"X": 1.0, "V": 10.0, "kappa": 0.01, "spin": 0.1, "g": 1.0}  # make all of order 1
-STEP = 1e-6  # of the derivatives, in those scales
+STEP = 1e-6  # of the derivatives, in the scales of the unknowns
 
 
 @dataclass(frozen=True)
@@ -35,107 +33,15 @@ class Fit:
         Root mean square of the residuals, px.
     sigma : dict
         Standard deviations that residuals of this size lead to: of ``X`` and ``V`` (3,), and of
-        ``kappa``, ``spin`` and ``g`` as far as they were free.
+        ``kappa``, ``spin``, ``g`` and ``late`` as far as they were free.
+    late : ndarray
+        How much later than their clocks say the views of unknown clock were taken, s.
     """
 
     ball: Ball
     rms: float
     sigma: dict[str, Array]
-
-
-@dataclass(frozen=True)
-class _Unknowns:
-    """The vector of the optimiser: X, V, then kappa, spin and g as far as they are free."""
-
-    kappa: float | None
-    spin: str | Array
-    g: float | None
-
-    @property
-    def blocks(self) -> dict[str, int]:
-        free_spin = SPINS[self.spin] if isinstance(self.spin, str) else 0
-        sizes = {"X": 3, "V": 3, "kappa": int(self.kappa is None), "spin": free_spin}
-        return {name: n for name, n in {**sizes, "g": int(self.g is None)}.items() if n}
-
-    def vector(self, ball: Ball) -> Array:
-        values = {"X": ball.X, "V": ball.V, "kappa": ball.kappa, "g": ball.g, "spin": ball.spin}
-        if self.blocks.get("spin") == SPINS["across"]:
-            values["spin"] = [side @ ball.spin for side in _sides(ball.V)]
-        return np.concatenate(
-            [np.full(n, values[name]) / SCALES[name] for name, n in self.blocks.items()]
-        )
-
-    def split(self, vectors: Array) -> dict[str, Array]:
-        """Blocks (n, size) of vectors (n, k), in their units."""
-        ends = np.cumsum(list(self.blocks.values()))[:-1]
-        parts = zip(self.blocks, np.split(vectors, ends, axis=-1), strict=True)
-        return {name: part * SCALES[name] for name, part in parts}
-
-    def balls(self, vectors: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """X, V, kappa, spin, g of vectors (n, k)."""
-        free = self.split(vectors)
-        known = {"kappa": self.kappa, "g": self.g}
-        kappa, g = (
-            free[name][:, 0] if name in free else np.full(len(vectors), known[name])
-            for name in ("kappa", "g")
-        )
-        return free["X"], free["V"], kappa, self.spins(free), g
-
-    def spins(self, free: dict[str, Array]) -> Array:
-        """Lambda (n, 3) for each vector."""
-        if "spin" not in free:
-            known = np.zeros(3) if isinstance(self.spin, str) else self.spin
-            return np.broadcast_to(known, free["V"].shape)
-        if self.spin == "full":
-            return free["spin"]
-        level, up = _sides(free["V"])
-        return free["spin"][:, :1] * level + free["spin"][:, 1:] * up
-
-    def ball(self, vector: Array) -> Ball:
-        X, V, kappa, spin, g = self.balls(vector[None])
-        return Ball(X[0], V[0], kappa[0], spin[0], g[0])
-
-
-def _sides(V: Array) -> tuple[Array, Array]:
-    """Two unit vectors across velocities (..., 3) and each other, the first of them horizontal."""
-    level = np.cross(V, [0, 0, 1.0])
-    level /= np.linalg.norm(level, axis=-1, keepdims=True)
-    return level, np.cross(level, V) / np.linalg.norm(V, axis=-1, keepdims=True)
-
-
-@dataclass(frozen=True)
-class _Model:
-    """What a shot would show, as a function of the vector of the optimiser."""
-
-    shot: Shot
-    unknowns: _Unknowns
-
-    @classmethod
-    def of(cls, shot: Shot, kappa: float | None, spin: str | ArrayLike, g: float | None) -> _Model:
-        if isinstance(spin, str) and spin not in SPINS:
-            raise DataError(f"spin is {spin!r}; it must be one of {', '.join(SPINS)}, or known")
-        spin = spin if isinstance(spin, str) else array("spin", spin, (3,))
-        model = cls(shot, _Unknowns(kappa, spin, g))
-        if model.observed.size < (n := sum(model.unknowns.blocks.values())):
-            raise DataError(f"{model.observed.size} pixels cannot tell {n} unknowns")
-        return model
-
-    @property
-    def observed(self) -> Array:
-        """Pixel coordinates (n,) of the photos that there are."""
-        both = np.stack([self.shot.pixels_1, self.shot.pixels_2])
-        return both[np.isfinite(both)]
-
-    def positions(self, vectors: Array) -> Array:
-        """(k, images, 3) for vectors (k, unknowns)."""
-        return flights(self.shot.times, *self.unknowns.balls(vectors))[..., :3]
-
-    def pixels(self, vectors: Array) -> Array:
-        """(k, n) pixels that should have been observed."""
-        shot, x = self.shot, self.positions(vectors)
-        cameras = (shot.scene.camera_1, shot.scene.camera_2)
-        seen = np.isfinite(np.stack([shot.pixels_1, shot.pixels_2]))
-        return np.stack([camera.image(x) for camera in cameras], axis=1)[:, seen]
+    late: Array = field(default_factory=lambda: np.zeros(0))
 
 
 def _derivative(function: Callable[[Array], Array], p: Array) -> Array:
@@ -189,8 +95,37 @@ def fit_pixels(
     DataError
         If there are fewer pixels than unknowns, or ``spin`` is another word.
     """
-    model = _Model.of(shot, kappa, spin, g)
-    p, observed = model.unknowns.vector(start or start_from_overlap(shot)), model.observed
+    Pixels.of(views_of(shot), kappa, spin, g)  # refuses before a start is looked for
+    start = start or start_from_overlap(shot)
+    return fit_views(views_of(shot), kappa=kappa, spin=spin, g=g, start=start)
+
+
+def fit_views(
+    views: Sequence[View],
+    *,
+    kappa: float | None = None,
+    spin: str | ArrayLike = "full",
+    g: float | None = GRAVITY,
+    start: Ball | None = None,
+) -> Fit:
+    """As :func:`fit_pixels`, for any views: one camera or more, shadows, clocks of their own.
+
+    Parameters
+    ----------
+    views : sequence of View
+        A view whose ``late`` is None has a clock to be found: one unknown more.
+    kappa, spin, g
+        As for :func:`fit_pixels`.
+    start : Ball, optional
+        Where to begin; by default what the lines of sight say.
+
+    Raises
+    ------
+    DataError
+        As :func:`fit_pixels`.
+    """
+    model = Pixels.of(views, kappa, spin, g)
+    p, observed = model.unknowns.vector(start or start_from_lines(views)), model.observed
     found = least_squares(
         lambda p: model.pixels(p[None])[0] - observed,
         p,
@@ -201,7 +136,9 @@ def fit_pixels(
     )
     rms = float(np.sqrt(np.mean(found.fun**2)))
     spread = rms * np.sqrt(np.diag(np.linalg.pinv(found.jac.T @ found.jac)))
-    return Fit(model.unknowns.ball(found.x), rms, model.unknowns.split(spread))
+    parts = model.unknowns.split(found.x)
+    late = parts.get("late", np.zeros(0))
+    return Fit(model.unknowns.ball(found.x), rms, model.unknowns.split(spread), late)
 
 
 def path_covariance(
@@ -240,8 +177,42 @@ def path_covariance(
     DataError
         As :func:`fit_pixels`.
     """
-    model = _Model.of(shot, kappa, spin, g)
+    views = views_of(shot)
+    return views_covariance(views, ball, sigma=sigma, kappa=kappa, spin=spin, g=g)
+
+
+def views_covariance(
+    views: Sequence[View],
+    ball: Ball,
+    *,
+    sigma: float = SIGMA,
+    kappa: float | None = None,
+    spin: str | ArrayLike = "full",
+    g: float | None = GRAVITY,
+) -> Array:
+    """As :func:`path_covariance`, for :func:`fit_views`, at all times of all views."""
+    model = Pixels.of(views, kappa, spin, g)
     p = model.unknowns.vector(ball)
     J, D = _derivative(model.pixels, p), _derivative(model.positions, p)
     inverse = number("sigma", sigma, 0) ** 2 * np.linalg.inv(J.T @ J)
     return np.einsum("ikp,pq,jkq->kij", D, inverse, D)
+
+
+def leverage(
+    views: Sequence[View],
+    ball: Ball,
+    *,
+    kappa: float | None = None,
+    spin: str | ArrayLike = "full",
+    g: float | None = GRAVITY,
+) -> Array:
+    """What is left of an error of a pixel in the pixel that the fit shows there: (n,).
+
+        diagonal of J (J'J)^-1 J'
+
+    The errors of the others have their share in it too, but of *this* one only this is left. The
+    sum is the number of unknowns: with n pixels, on average unknowns / n.
+    """
+    model = Pixels.of(views, kappa, spin, g)
+    J = _derivative(model.pixels, model.unknowns.vector(ball))
+    return np.einsum("np,pq,nq->n", J, np.linalg.inv(J.T @ J), J)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sympy import Expr, Matrix, Symbol, exp, simplify, sqrt, symbols
+from sympy import Expr, Matrix, Symbol, exp, simplify, solve, sqrt, symbols, tan
 
 from kfsheet.errors import DataError
 
@@ -12,6 +12,23 @@ m, c_D, c_L, g, t = symbols("m c_D c_L g t", positive=True)
 X = Matrix(symbols("X_1:4", real=True))
 V = Matrix(symbols("V_1:4", real=True))
 Omega = Matrix(symbols("Omega_1:4", real=True))
+
+
+def diamond_from_lines(theta: Symbol, eps: Symbol, half: Symbol) -> tuple[Expr, Expr]:
+    """Section 3.2: the left corner of the error diamond, and its diagonal along the base.
+
+        y = tan(theta) x,   y = -tan(theta - eps) x + 2 m tan(theta - eps)
+
+    Returns
+    -------
+    corner, diagonal : Expr
+        x where the two lines meet, and 2 (m - x), m being ``half`` the distance of the cameras.
+    """
+    x = Symbol("x")
+    one = tan(theta) * x
+    other = -tan(theta - eps) * x + 2 * half * tan(theta - eps)
+    (corner,) = solve(one - other, x)
+    return corner, 2 * (half - corner)
 
 
 def length(v: Matrix) -> Expr:
