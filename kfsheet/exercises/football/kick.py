@@ -72,6 +72,41 @@ def photographed(
     return {"i": i.round(1).tolist(), "j": j.round(1).tolist()}
 
 
+def model_error(p: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
+    """What one step of the model misses of x and z, m: from three true positions, h = 0 and p = 2.
+
+    Neither photos nor analyses are in it; it is what the source's equations alone do wrong.
+    """
+    missed = []
+    for path, gravity in zip(map(np.array, flight(p)), (0, p["g"]), strict=True):
+        v = np.diff(path) / p["dt"]
+        slower = p["f"] * np.abs(v) * v + gravity
+        missed.append(-np.diff(v) * p["dt"] - slower[:-1] * p["dt"] ** 2)
+    return missed[0], missed[1]
+
+
+def tilted(
+    x: Sequence[float], z: Sequence[float], degrees: float, camera: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """A flight as a camera sees it whose picture plane is not the plane of the flight, m.
+
+    The planes meet at the goal line; away from it the ball is farther from the camera, so all of
+    it looks smaller.
+
+    Parameters
+    ----------
+    x, z : sequence of float
+        The flight, m.
+    degrees : float
+        Angle between both planes.
+    camera : float
+        Distance of the camera from the goal line, m; ``float("inf")`` for one far away.
+    """
+    way, height, angle = np.array(x), np.array(z), np.radians(degrees)
+    smaller = 1 / (1 + way * np.sin(angle) / camera)
+    return way * np.cos(angle) * smaller, height * smaller
+
+
 def draw_kick(dice: RandomState, p: Mapping[str, float]) -> dict[str, list[float | None]]:
     """Another kick, simulated like the first one; one pixel of each kind is not observed."""
     x, z = flight(p)

@@ -37,9 +37,17 @@ BETWEEN = (0.2, 0.8)
 OTHERS = 1000
 
 
-def photos_of(seed: int) -> dict[str, list[float]]:
-    """Pixels of the shipped flight, photographed with other noise."""
-    p = football.defaults()
+def photos_of(seed: int = SEED, camera: float = 3) -> dict[str, list[float]]:
+    """Pixels of the shipped flight, photographed anew.
+
+    Parameters
+    ----------
+    seed : int
+        Of the noise; as it stands, that of the shipped photos.
+    camera : float
+        What the camera really errs by, px; a filter may believe something else.
+    """
+    p = football.defaults() | {"r_i": camera**2, "r_j": camera**2}
     return photographed(*flight(p), p, RandomState(seed))
 
 
@@ -68,3 +76,30 @@ def first_typical_seed() -> int:
     """The first of the seeds 0, 1, 2, ... whose kick is typical."""
     ranges = typical_ranges()
     return next(seed for seed in count() if is_typical(seed, ranges))
+
+
+def rms_over_kicks(
+    *runs: str, kicks: int = 400, axes: str = "xz", **parameters: float
+) -> dict[str, float]:
+    """Errors over the photos 1 to 15 of other kicks, m; of both axes together.
+
+    Parameters
+    ----------
+    *runs : str
+        Whose errors: ``"cam", "f", "a", "ekf", "free"``.
+    kicks : int
+        How many, at most a thousand are compared with.
+    axes : str
+        ``"xz"``, or one of them.
+    **parameters : float
+        Other values than those of the consistent model.
+    """
+    columns = [f"e_{axis}_{run}" for axis in axes for run in runs]
+    options = {**CONSISTENT, **parameters}
+    rows = study(football, kicks, other_kicks(kicks), columns=columns, **options).rows
+
+    def both(run: str) -> float:
+        squares = [rows[f"e_{axis}_{run}"]["rms"].iloc[1:] ** 2 for axis in axes]
+        return float(np.sqrt(np.mean(squares)))
+
+    return {run: both(run) for run in runs}

@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from kfsheet import evaluate
 from kfsheet.exercises.football import DATA, football
-from kfsheet.exercises.football.kick import flight
+from kfsheet.exercises.football.kick import flight, model_error, tilted
 from kfsheet.exercises.football.typical import (
     SEED,
     SUMMARIES,
@@ -72,3 +72,22 @@ def test_a_test_of_the_consistent_model_finds_nothing_wrong_with_the_shipped_pho
 
 def test_the_draws_of_two_seeds_differ():
     assert photos_of(1)["i"] != photos_of(2)["i"]
+
+
+def test_the_model_itself_errs_by_millimetres_and_a_tilted_camera_by_a_metre():
+    """From the table of the truth alone: three positions in a row, one step of the equations."""
+    truth = np.loadtxt(DATA / "football_truth.csv", delimiter=",", skiprows=1)[:, 2:]
+    v = np.diff(truth, axis=0) / 0.1
+    step = truth[1:-1] + (v[:-1] - 0.003 * np.abs(v[:-1]) * v[:-1] - [0, 0.980665]) * 0.1
+    errors = np.sqrt(((step - truth[2:]) ** 2).mean(axis=0))
+    assert errors == pytest.approx([0.0019, 0.0150], abs=5e-5)
+    assert [np.sqrt((e**2).mean()) for e in model_error(P)] == pytest.approx(errors, rel=1e-3)
+    x, z = truth.T
+    for distance, most in ((np.inf, 0.089), (40.0, 1.22)):
+        # A pinhole at (0, -distance): the ball's ray meets the picture plane, depth 0.
+        depth, way = x * np.sin(np.radians(5)), x * np.cos(np.radians(5))
+        meets = way * (1 if distance == np.inf else distance / (distance + depth))
+        seen, height = tilted(x, z, 5, distance)
+        assert np.allclose(seen, meets)
+        assert np.allclose(height * way, z * meets)
+        assert np.abs(seen - x).max() == pytest.approx(most, abs=0.005)

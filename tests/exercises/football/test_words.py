@@ -8,11 +8,12 @@ import pytest
 
 from kfsheet import evaluate, study
 from kfsheet.exercises.football import exercise, football
-from kfsheet.exercises.football.typical import other_kicks
+from kfsheet.exercises.football.typical import other_kicks, rms_over_kicks
 
 ABOUT = " ".join(exercise.about)
 README = (Path(__file__).parents[3] / "README.md").read_text(encoding="utf-8")
 NOTEBOOK = (Path(__file__).parents[3] / "notebooks" / "01_football.py").read_text(encoding="utf-8")
+PROSE = " ".join(NOTEBOOK.replace("\n#", "\n").split())
 
 
 def outside(run):
@@ -46,11 +47,9 @@ def test_no_words_say_that_a_variance_makes_the_camera_worse(text):
 def test_the_errors_over_400_kicks_are_those_that_the_read_me_names():
     said = re.search(r"camera errs by ([\d.]+) m, .* by ([\d.]+) m, .* by ([\d.]+) m", ABOUT)
     runs = ("cam", "a", "ekf")
-    columns = [f"e_{axis}_{run}" for axis in "xz" for run in runs]
-    found = study(football, 400, other_kicks(400), columns=columns, h=0, p=2)
+    found = rms_over_kicks(*runs)
     for run, value in zip(runs, said.groups(), strict=True):
-        squares = [found.rows[f"e_{axis}_{run}"]["rms"][1:] ** 2 for axis in "xz"]
-        assert np.sqrt(np.mean(squares)) == pytest.approx(float(value), abs=6e-4)
+        assert f"{found[run]:.3f}" == value
 
 
 def test_the_band_of_the_four_states_settles():
@@ -58,3 +57,40 @@ def test_the_band_of_the_four_states_settles():
     late = found["x_high"][6:]
     assert late.max() - late.min() < 0.1 * late.mean()
     assert found["x_high"][0] > 1.5 * late.mean()
+
+
+def test_the_answers_of_the_notebook_are_right():
+    gain = [evaluate(football, r_i=r).attrs["scalars"]["K_x"] for r in (9, 18, 44.2**2 * 0.01)]
+    assert f"from {1000 * gain[0]:.1f} to {1000 * gain[1]:.1f} mm/px" in NOTEBOOK
+    assert f"to {gain[1] / gain[0]:.2f} of what" in NOTEBOOK
+    assert gain[2] == pytest.approx(1 / 88.4)
+    assert f"= {44.2**2 * 0.01:.1f}$ px²" in NOTEBOOK
+    wrong = evaluate(football, h=0, p=2, b_x=1e-4, b_z=1e-4).attrs["scalars"]
+    said = re.search(r"should scatter by ([\d.]+) px and do so by ([\d.]+)", NOTEBOOK).groups()
+    assert said == (f"{wrong['sigma_d_j']:.1f}", f"{wrong['std_d_j']:.1f}")
+
+
+def test_the_background_variance_that_reproduces_itself_is_near_that_of_the_source():
+    """Oracle: the covariances of the extrapolation followed from step to step."""
+
+    def background(b):
+        keep, noise = 9 / (9 + 44.2**2 * b), 9 / 44.2**2
+        P = np.zeros((2, 2))  # of this analysis and the one before
+        F = np.array([[2 * keep, -keep], [1, 0]])
+        for _ in range(200):
+            P = F @ P @ F.T + np.diag([(1 - keep) ** 2 * noise, 0])
+        return np.array([2, -1]) @ P @ np.array([2, -1])
+
+    b = 0.01
+    first = background(b)
+    for _ in range(100):
+        b = background(b)
+    said = re.search(r"makes a \$b\$ of ([\d.]+) m², and the fixed point lies at (\d\.\d+)", PROSE)
+    assert said.groups() == (f"{first:.4f}", f"{b:.4f}")
+
+
+def test_four_states_that_claim_fifty_times_the_noise_are_no_better_than_the_scheme():
+    scheme, q = rms_over_kicks("a")["a"], 5
+    assert rms_over_kicks("ekf", q=q)["ekf"] == pytest.approx(scheme, rel=0.01)
+    nis = study(football, 400, other_kicks(400), columns=[], q=q).scalars.loc["mean_NIS", "mean"]
+    assert nis == pytest.approx(1.2, abs=0.05)
