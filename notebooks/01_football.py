@@ -553,6 +553,9 @@ round(float(nis["mean"]), 2)
 #
 # **Routine**
 #
+# 0. The source has its students type the model and the analysis. So do it: a file `me.csv` with the
+#    lines `id,name` and `1,Me`, then `kfsheet handout football --roster me.csv --out own` makes a
+#    workbook with ten orange answers that says, live, whether they look right.
 # 1. In `workbooks/football.xlsx`, set `h` to 0 and `p` to 2 and read the root mean square errors on
 #    the sheet Parameters. Then double `r_i`: by what factor does `K_x` change, and why not by 2?
 # 2. At which `r_i` would the gain be exactly half of its limit $1/a$? Derive it, then try it.

@@ -62,14 +62,14 @@ CHARTS = (
             Series("time", "e_x_a", "analysis", "analysis"),
             Series("time", "e_x_ekf", "four states", "second"),
         ),
-        note="As printed (h = 0.5, p = 1), the analysis of x is worse than the camera alone.",
+        note="As printed and as built, the analysis of x is worse than the camera alone.",
     ),
     Chart(
         "Height at the goal line, forecast from each photo",
         "time of the photo (s)",
         "z_goal (m)",
         (Series("time", "z_goal", "z_goal", "analysis"),),
-        note="The forecast settles as the ball comes closer.",
+        note="The nearer the ball, the less is left to forecast.",
     ),
     Chart(
         "Four states: error of x and what the filter claims",
@@ -80,7 +80,7 @@ CHARTS = (
             Series("time", "x_low", "", "second band"),
             Series("time", "x_high", "2 sigma, as claimed", "second band"),
         ),
-        note="The band follows from the covariance, which settles after a few photos.",
+        note="The band is what the covariance says; as built, it settles after a few photos.",
     ),
     Chart(
         "Four states: the gains of a pixel in i",

@@ -2,7 +2,10 @@
 
 The model steps the ball with mean velocities u, w; the camera sees pixels. The source keeps the
 covariance of the forecast fixed, so both gains are constants. Its equations are kept as printed,
-behind two switches: ``h`` = 1/2 and ``p`` = 1 are the printed model, ``h`` = 0 the consistent one.
+behind two switches: ``h`` = 1/2 and ``p`` = 1 are the printed model, ``h`` = 0 and ``p`` = 2 the
+consistent one. ``along`` and ``first`` mend two more errors, in the free run alone, so that the
+source's sheet stays as simple as it is. Beside it stands the filter of
+:mod:`kfsheet.exercises.football.four_states`.
 """
 
 from __future__ import annotations

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from kfsheet import evaluate, study
+from kfsheet.cli.commands import main
 from kfsheet.exercises.football import exercise, football
 from kfsheet.exercises.football.typical import other_kicks, rms_over_kicks
 
@@ -50,6 +51,16 @@ def test_the_errors_over_400_kicks_are_those_that_the_read_me_names():
     found = rms_over_kicks(*runs)
     for run, value in zip(runs, said.groups(), strict=True):
         assert f"{found[run]:.3f}" == value
+
+
+def test_the_notebook_says_how_to_get_a_sheet_to_fill_in(tmp_path, monkeypatch):
+    """As it stands there: the file of one student, and the command."""
+    *lines, command = re.search(r"lines `(.*?)` and `(.*?)`, then `kfsheet (.*?)`", PROSE).groups()
+    monkeypatch.chdir(tmp_path)
+    Path("me.csv").write_text("\n".join(lines) + "\n")
+    assert main(command.split()) == 0
+    assert Path("own/students/1/football.xlsx").exists()
+    assert len(exercise.questions) == 10
 
 
 def test_the_band_of_the_four_states_settles():
