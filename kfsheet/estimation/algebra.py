@@ -20,10 +20,12 @@ from sympy import (
     Function,
     ImmutableMatrix,
     Matrix,
+    Mul,
     Symbol,
     diag,
     eye,
     factor,
+    fraction,
     integrate,
     inverse_laplace_transform,
     limit,
@@ -108,7 +110,17 @@ class Analysis:
 
 
 def _tidy(matrix: Matrix) -> Matrix:
-    return matrix.applyfunc(lambda e: factor(simplify(e)))
+    return matrix.applyfunc(lambda e: _signed(factor(simplify(e))))
+
+
+def _signed(e: Expr) -> Expr:
+    """The same fraction with its sign in front: SymPy may leave it in every term of a sum."""
+    above, below = (Mul.make_args(part) for part in fraction(e))
+    turned = [f for f in (*above, *below) if f.is_Add and f.could_extract_minus_sign()]
+    if not turned:
+        return e
+    parts = (Mul(*(-f if f in turned else f for f in part)) for part in (above, below))
+    return (-1) ** len(turned) * next(parts) / next(parts)
 
 
 def analysis(

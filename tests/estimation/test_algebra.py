@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from sympy import Matrix, Piecewise, Symbol, diag, lambdify, simplify, symbols, zeros
+from sympy import Matrix, Piecewise, Symbol, diag, fraction, lambdify, simplify, symbols, zeros
 
 from kfsheet import analysis, correlated_covariance, diagonal_analysis, gain_limits, sequential_gain
 from kfsheet.errors import ModelError
@@ -115,3 +115,16 @@ def test_observations_one_after_the_other_equal_the_joint_update():
 def test_what_does_not_fit_is_refused(call, message):
     with pytest.raises(ModelError, match=message):
         call()
+
+
+def test_a_fraction_of_correlated_errors_has_its_sign_in_front():
+    """With a positive correlation a pixel that counts down lowers x, whatever the numbers are."""
+    B = correlated_covariance(b_x, b_z, rho)
+    K = camera(B).K
+    oracle = B * diag(a, -a) * (diag(r_i, r_j) + diag(a, -a) * B * diag(a, -a)).inv()
+    assert (K - oracle).applyfunc(simplify).is_zero_matrix
+    for entry, sign in zip(K, (1, -1, 1, -1), strict=True):
+        above, below = fraction(entry)
+        assert not below.could_extract_minus_sign()
+        assert above.could_extract_minus_sign() == (sign < 0)
+        assert [f for f in above.args if f.is_Add and f.could_extract_minus_sign()] == []

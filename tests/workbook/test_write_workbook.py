@@ -29,7 +29,7 @@ from kfsheet.workbook.write.run import Run
 from kfsheet.workbook.write.sheet import is_formula
 from kfsheet.workbook.write.write_workbook import assemble, compose, workbook_bytes
 
-SECTIONS = ["Reanalysis", "Free run", "Errors", "Pixel frame", "Goal line"]
+SECTIONS = ["Reanalysis", "Free run", "Errors", "Pixel frame", "Goal line", "Four states"]
 
 
 @pytest.fixture(scope="module")
@@ -173,7 +173,8 @@ def test_formulas_use_names_so_that_they_read_like_mathematics(book):
     sheet = book["Reanalysis"]
     assert sheet["K9"].value == "=IF(ISNUMBER(I9),G9+K_x*I9,G9)"
     assert sheet["E9"].value == "=(K8-K7)/dt-dt*f*SIGN(E8)*E8^2"
-    assert book["Parameters"]["B23"].value == "=a*b_x/(r_i+a^2*b_x)"
+    ((page, cell),) = book.defined_names["K_x"].destinations
+    assert book[page][cell].value == "=a*b_x/(r_i+a^2*b_x)"
 
 
 def test_every_formula_carries_the_value_that_independent_engines_find(

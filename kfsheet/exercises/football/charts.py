@@ -60,14 +60,36 @@ CHARTS = (
         (
             Series("time", "e_x_cam", "camera alone", "observation"),
             Series("time", "e_x_a", "analysis", "analysis"),
+            Series("time", "e_x_ekf", "four states", "second"),
         ),
-        note="As printed (h = 0.5, p = 1), the analysis of x is worse than the camera alone.",
+        note="As printed and as built, the analysis of x is worse than the camera alone.",
     ),
     Chart(
         "Height at the goal line, forecast from each photo",
         "time of the photo (s)",
         "z_goal (m)",
         (Series("time", "z_goal", "z_goal", "analysis"),),
-        note="The forecast settles as the ball comes closer.",
+        note="The nearer the ball, the less is left to forecast.",
+    ),
+    Chart(
+        "Four states: error of x and what the filter claims",
+        "time (s)",
+        "estimate - truth (m)",
+        (
+            Series("time", "e_x_ekf", "four states", "second"),
+            Series("time", "x_low", "", "second band"),
+            Series("time", "x_high", "2 sigma, as claimed", "second band"),
+        ),
+        note="The band is what the covariance says; as built, it settles after a few photos.",
+    ),
+    Chart(
+        "Four states: the gains of a pixel in i",
+        "time (s)",
+        "gain (m/px, m/s/px)",
+        (
+            Series("time", "K_x_i_ekf", "K_x: metres of x", "first"),
+            Series("time", "K_u_i_ekf", "K_u: metres a second of u", "second"),
+        ),
+        note="A photo shows a place; through the correlation of their errors it corrects u too.",
     ),
 )
