@@ -1,6 +1,8 @@
 """The public names: where each is defined. kfsheet/__init__.py reads this file too."""
 
 from .cli.show import formula_table as formula_table
+from .ensemble.consistency import Consistency as Consistency
+from .ensemble.consistency import consistency as consistency
 from .ensemble.draws import Draws as Draws
 from .ensemble.nees import NEES as NEES
 from .ensemble.study import Study as Study

@@ -77,12 +77,18 @@ def _parameters(m: Recurrence) -> None:
     m.parameter("y_R", 0, "m", "radar, height")
     m.parameter("sigma_theta", 0.01, "rad", "radar, error of the angle", sign="positive")
     m.parameter("sigma_r", 30.48, "m", "radar, error of the range", sign="positive")
+    for kind, words in (("theta", "angle"), ("r", "range")):
+        what = f"filters, claimed over true error of the {words}"
+        m.parameter(f"belief_{kind}", 1, "", what, sign="positive")
     m.parameter("Phi_s", 0, "m2/s3", "noise of the model, spectral density", sign="nonnegative")
     for name, unit, error, deviation, words in STATE:
         m.parameter(f"e_{name}", error, unit, f"start, error of the {words}")
         m.parameter(
             f"s_{name}", deviation, unit, f"start, claimed error of the {words}", sign="positive"
         )
+    for kind, unit, words in (("theta", "rad", "angle"), ("r", "m", "range")):
+        claimed = m[f"belief_{kind}"] * m[f"sigma_{kind}"]
+        m.derived(f"s_{kind}", claimed, unit, f"radar, claimed error of the {words}")
     m.time(t * dt, "s", "time since the shot")
 
 
@@ -117,7 +123,7 @@ def _while_flying(m: Recurrence, value: Expr) -> Expr:
 
 def _radar(m: Recurrence, noise: Table, arctangent: Arctangent) -> None:
     page = "Radar"
-    x, y, x_R, y_R, s_theta, s_r = m["x_true", "y_true", "x_R", "y_R", "sigma_theta", "sigma_r"]
+    x, y, x_R, y_R = m["x_true", "y_true", "x_R", "y_R"]
     n_theta = m.data("n_theta", noise["n_theta"], "", "standard-normal draw", section=page)
     n_r = m.data("n_r", noise["n_r"], "", "standard-normal draw", section=page)
     theta, r, theta_obs, r_obs, x_obs, y_obs, r_x, r_y = m.columns(
@@ -127,17 +133,18 @@ def _radar(m: Recurrence, noise: Table, arctangent: Arctangent) -> None:
     shot = [Missing]
     m.define(theta[t], arctangent(y[t] - y_R, x[t] - x_R), "rad", "truth, angle", start=shot)
     m.define(r[t], sqrt((x[t] - x_R) ** 2 + (y[t] - y_R) ** 2), "m", "truth, range", start=shot)
-    for true, seen, sigma, draw in ((theta, theta_obs, s_theta, n_theta), (r, r_obs, s_r, n_r)):
-        measured = _while_flying(m, true[t] + sigma * draw[t])
-        unit, words = ("rad", "angle") if true is theta else ("m", "range")
+    for kind, true, seen, draw in (("theta", theta, theta_obs, n_theta), ("r", r, r_obs, n_r)):
+        measured = _while_flying(m, true[t] + m[f"sigma_{kind}"] * draw[t])
+        unit, words = ("rad", "angle") if kind == "theta" else ("m", "range")
         m.define(seen[t], measured, unit, f"measured {words}: truth + noise", start=shot)
     angle, reach, both = theta_obs[t], r_obs[t], (theta_obs[t], r_obs[t])
     position = Matrix([x_R + reach * cos(angle), y_R + reach * sin(angle)])
     m.define(x_obs[t], when_observed(both, position[0]), "m", "measured position, distance")
     m.define(y_obs[t], when_observed(both, position[1]), "m", "measured position, height")
-    spread = position.jacobian(both) * diag(s_theta**2, s_r**2) * position.jacobian(both).T
-    m.define(r_x[t], when_observed(both, spread[0, 0]), "m2", "variance of x_obs")
-    m.define(r_y[t], when_observed(both, spread[1, 1]), "m2", "variance of y_obs")
+    claimed = diag(m["s_theta"] ** 2, m["s_r"] ** 2)
+    spread = position.jacobian(both) * claimed * position.jacobian(both).T
+    m.define(r_x[t], when_observed(both, spread[0, 0]), "m2", "claimed variance of x_obs")
+    m.define(r_y[t], when_observed(both, spread[1, 1]), "m2", "claimed variance of y_obs")
 
 
 def _motion(m: Recurrence) -> tuple[dict[Symbol, State], list[Expr], Matrix]:
@@ -162,8 +169,8 @@ def extended_model(m: Recurrence, arctangent: Arctangent = atan2, wrap: bool = T
     right, up = x - m["x_R"], y - m["y_R"]
     angle = arctangent(up, right)
     observations = [
-        Observation("theta", m["theta_obs"][t], angle, m["sigma_theta"] ** 2, "rad", angle=wrap),
-        Observation("r", m["r_obs"][t], sqrt(right**2 + up**2), m["sigma_r"] ** 2, "m"),
+        Observation("theta", m["theta_obs"][t], angle, m["s_theta"] ** 2, "rad", angle=wrap),
+        Observation("r", m["r_obs"][t], sqrt(right**2 + up**2), m["s_r"] ** 2, "m"),
     ]
     return StateSpace(state, transition, Q, observations)
 
@@ -180,7 +187,8 @@ def linear_model(m: Recurrence) -> StateSpace:
 
 
 def _errors(m: Recurrence) -> None:
-    page = "Errors"
+    """Estimates minus truth from the first echo on: the start is given, no filter's doing."""
+    page, shot = "Errors", [Missing]
     runs = (("a", "EKF", ""), ("lin", "linear filter", "_a"), ("obs", "radar alone", ""))
     for run, words, stage in runs:
         for name, unit, _, _, what in STATE:
@@ -191,7 +199,7 @@ def _errors(m: Recurrence) -> None:
             error = _while_flying(m, estimate[t] - m[f"{name}_true"][t])
             if run == "obs":
                 error = when_observed(estimate[t], estimate[t] - m[f"{name}_true"][t])
-            m.define(e[t], error, unit, f"error of the {what}, {words}")
+            m.define(e[t], error, unit, f"error of the {what}, {words}", start=shot)
             if not name.startswith("v"):
                 m.summary(f"rms_{name}_{run}", RMS(e), "m", f"rms error of the {what}, {words}")
     _bands(m, page)

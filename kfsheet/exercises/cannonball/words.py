@@ -37,7 +37,7 @@ QUESTIONS = (
     Question("H_theta_y", 2, "Derivative of the angle with respect to y."),
     Question("H_r_x", 1, "Derivative of the range with respect to x."),
     Question("H_r_y", 1, "Derivative of the range with respect to y."),
-    Question("S_theta", 2, "H P H' + r with the covariance of the forecast."),
+    Question("S_theta", 2, "H P H' + s_theta^2 with the covariance of the forecast."),
     Question("K_x_theta", 2, "P H' / S, first element."),
     Question("K_y_theta", 2, "P H' / S, third element."),
     Question("P_xx_1", 2, "P - K S K', first element."),
@@ -57,7 +57,8 @@ TASK = (
     "and the angle theta of that line with the direction in which x grows: nearly pi at first, "
     "when the ball is far on the left. The columns theta_obs and r_obs hold what it measured, "
     "with standard deviations sigma_theta and sigma_r; nothing in sweep 0, nothing after the "
-    "landing.",
+    "landing. The filter goes by the deviations that it is told, s_theta and s_r: the true ones "
+    "times belief_theta and belief_r, which are 1 for an honest filter.",
     "Innovation. d_theta is theta_obs less the angle at which the radar would see the forecast; "
     "it is brought into (-pi, pi], since full turns do not count. Without theta_obs it has no "
     "value.",
@@ -65,7 +66,7 @@ TASK = (
     "x and y, taken at the forecast. Those with respect to velocities are 0. They have a value in "
     "every sweep from 1 on, whether or not there is an echo.",
     "The angle first. With H = (H_theta_x, 0, H_theta_y, 0) and the forecast's covariance P, of "
-    "which P_xx_f, P_xy_f and P_yy_f are all that you need: S_theta = H P H' + sigma_theta^2. The "
+    "which P_xx_f, P_xy_f and P_yy_f are all that you need: S_theta = H P H' + s_theta^2. The "
     "gain K = P H' / S_theta has K_x_theta as its element for x and K_y_theta as that for y; both "
     "are 0 where d_theta has no value. The covariance is now P - K S_theta K', with P_xx_1 as the "
     "variance of x, and the state is x_1, y_1.",

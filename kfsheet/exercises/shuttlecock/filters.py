@@ -23,6 +23,7 @@ def joint_model(m: Recurrence, axes: str = "xyz") -> StateSpace:
         a_f = -k v_f,    on the z axis -k v_f - g
 
     The acceleration is that of linear drag at the new velocity, and gravity enters there alone.
+    The source's "Q = 0.04" is q on all three states, or with f_q = 0 on the acceleration alone.
 
     Parameters
     ----------
@@ -38,7 +39,7 @@ def joint_model(m: Recurrence, axes: str = "xyz") -> StateSpace:
     """
     if not axes or set(axes) - set(AXES):
         raise ModelError(f"the axes are {axes!r}; give some of {', '.join(AXES)}")
-    dt, k, g, q, s_q, r_obs = m["dt", "k_fit", "g", "q", "s_q", "r_obs"]
+    dt, k, g, q, f_q, s_q, r_obs = m["dt", "k_fit", "g", "q", "f_q", "s_q", "r_obs"]
     state, transition, seen = {}, [], []
     for axis in axes:
         words = AXES[axis]
@@ -50,7 +51,7 @@ def joint_model(m: Recurrence, axes: str = "xyz") -> StateSpace:
         a_new = -k * v_new - (g if axis == "z" else 0)
         transition += [p + v * dt + a * dt**2 / 2, v_new, a_new.expand()]
         seen.append(Observation(axis, m[f"{axis}_obs"][t], p, r_obs, "m"))
-    Q = diag(*[q, q / s_q**2, q / s_q**4] * len(axes))
+    Q = diag(*[f_q * q, f_q * q / s_q**2, q / s_q**4] * len(axes))
     return StateSpace(state, transition, Q, seen)
 
 
@@ -61,8 +62,8 @@ def exact_model(m: Recurrence) -> StateSpace:
         v_f = v (1 - k X),    X = (1 - exp(-k T))/k,
 
     and on the z axis what gravity adds; see :func:`kfsheet.estimation.drag.flight`. The spectral
-    density ``Phi_s`` says how much the filter doubts this, and ``gate`` which observations it
-    ignores.
+    density ``Phi_s`` says how much the filter doubts this, ``belief_r`` what it is told of the
+    cameras' errors, and ``gate`` which observations it ignores.
 
     Parameters
     ----------
@@ -75,7 +76,7 @@ def exact_model(m: Recurrence) -> StateSpace:
     seen = []
     for axis, words in AXES.items():
         p, v = (Symbol(f"{letter}{axis}", real=True) for letter in ("", "v"))
-        variance = m[f"var_{axis}"]
+        variance = m[f"r_{axis}"]
         state[p] = State("m", words, m[f"{axis}_obs"][t], variance)
         state[v] = State("m/s", f"velocity {WAYS[axis]}", 0, m["var_v"])
         g = m["g"] if axis == "z" else 0

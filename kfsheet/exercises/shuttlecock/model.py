@@ -70,6 +70,7 @@ def _parameters(m: Recurrence) -> None:
     m.parameter(
         "k_2", 0, "1/m", "drag over mass, quadratic, of the truth alone", sign="nonnegative"
     )
+    m.parameter("f_lin", 1, "", "linear drag of the truth, in units of k_m", sign="nonnegative")
     f_k = m.parameter(
         "f_k", 1, "", "drag that filters and fits assume, in units of k_m", sign="positive"
     )
@@ -80,8 +81,12 @@ def _parameters(m: Recurrence) -> None:
     m.parameter("z_fall", 0, "m", "height at which it is to be kicked back")
     m.parameter("SNR", 25, "", "power of the signal over that of the noise", sign="positive")
     m.parameter("q", 0.04, "m2", "Q of the filter, in m2, (m/s)2 and (m/s2)2", sign="nonnegative")
+    m.parameter("f_q", 1, "", "1: Q as it is; 0: on the acceleration only", sign="nonnegative")
     m.parameter("s_q", 1, "s", "second that makes the units of Q fit", sign="positive")
     m.parameter("r_obs", 0.04, "m2", "R of the filter", sign="positive")
+    m.parameter(
+        "belief_r", 1, "", "exact filter, claimed over true error of the cameras", sign="positive"
+    )
     m.parameter("f_start", 1, "", "start, variance of a position, in units of R", sign="positive")
     m.parameter("var_v", 25, "m2/s2", "start, variance of a velocity", sign="positive")
     m.parameter("var_a", 25, "m2/s4", "start, variance of an acceleration", sign="positive")
@@ -100,7 +105,9 @@ def _truth(m: Recurrence) -> None:
     position = m.columns(*(f"{axis}_true" for axis in AXES), section=page)
     velocity = m.columns(*(f"v{axis}_true" for axis in AXES), section=page)
     speed = sqrt(sum(v[t] ** 2 for v in velocity))
-    m.define(k_eff[t], m["k_m"] + m["k_2"] * speed, "1/s", "drag over mass at this speed")
+    m.define(
+        k_eff[t], m["f_lin"] * m["k_m"] + m["k_2"] * speed, "1/s", "drag over mass at this speed"
+    )
     middle = (3 * k_eff[t - 1] - k_eff[t - 2]) / 2
     m.define(k_step[t], middle, "1/s", "the same, half a step ago", start=[k_eff[t], k_eff[t - 1]])
     m.define(X[t], distorted(k_step[t], dt), "s", "distorted time of the step")
@@ -125,6 +132,8 @@ def _camera(m: Recurrence, noise: Table) -> None:
         variance = m.summary(
             f"var_{axis}", RMS(true) ** 2 / m["SNR"], "m2", f"variance of the noise, {words}"
         )
+        what = f"exact filter, claimed variance of the noise, {words}"
+        m.summary(f"r_{axis}", m["belief_r"] ** 2 * variance, "m2", what)
         seen, low, high = m.columns(f"{axis}_obs", f"{axis}_low", f"{axis}_high", section=page)
         m.define(seen[t], true[t] + sqrt(variance) * draw[t], "m", f"seen by the cameras, {words}")
         band = "19 of 20 frames lie between: truth"
