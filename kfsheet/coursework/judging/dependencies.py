@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 from math import inf
 
@@ -63,3 +63,13 @@ def parameters_of(model: Recurrence, name: str) -> tuple[str, ...]:
         waiting += names & model.derived_scalars.keys() - found
         found |= names
     return tuple(p for p in model.parameters if p in found)
+
+
+def closed(following: Mapping[str, set[str]], names: Iterable[str]) -> set[str]:
+    """Names, what follows them, what follows that, and so on."""
+    found, waiting = set(names), list(names)
+    while waiting:
+        more = following.get(waiting.pop(), set()) - found
+        found |= more
+        waiting += more
+    return found

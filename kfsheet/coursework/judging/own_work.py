@@ -7,7 +7,7 @@ from math import inf
 
 from kfsheet.coursework.judging.answer_rows import AnswerCell
 from kfsheet.coursework.judging.calculated_answers import CalculatedAnswers
-from kfsheet.coursework.judging.dependencies import delays
+from kfsheet.coursework.judging.dependencies import closed, delays
 from kfsheet.coursework.judging.model_runs import ModelRuns
 from kfsheet.coursework.judging.precedents import circle_in_words, quantities_named
 from kfsheet.coursework.judging.rearrangements import rearrangements
@@ -61,7 +61,7 @@ class OwnWork:
         follow in its row has closed the circle.
         """
         reads = {name: self._answers_read(name, cell, right) for name, cell in right.items()}
-        reached = {name: _reached(reads, name) for name in reads}
+        reached = {name: closed(reads, reads[name]) for name in reads}
         return {
             name: f"it goes in a circle with {other}, which needs {name}"
             for name in right
@@ -111,14 +111,3 @@ class OwnWork:
     def _needs(self, names: Collection[str], cell: AnswerCell) -> bool:
         """Whether an answer needs one of some columns and scalars."""
         return bool(names) and self._calculated.needs(lambda n, _: n in names, cell.address)
-
-
-def _reached(reads: Mapping[str, set[str]], name: str) -> set[str]:
-    """What a name leads to, over any number of steps."""
-    found: set[str] = set()
-    waiting = [name]
-    while waiting:
-        new = reads[waiting.pop()] - found
-        found |= new
-        waiting += new
-    return found

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sympy import Add, Basic, Indexed, IndexedBase, Mul, Number, Piecewise, Pow
 
+from kfsheet.coursework.judging.dependencies import closed
 from kfsheet.coursework.judging.model_runs import ModelRuns, World
 from kfsheet.model.expressions import REMEMBERED, columns_read, scalars, t
 from kfsheet.model.quantities import Column, Scalar
@@ -58,6 +59,7 @@ class Rearrangements:
         self.names = [*model.parameters, *(n for n in self.items if n not in numbers)]
         self._found: dict[str, dict[str, bool]] = {}
         self._others: dict[str, dict[str, set[str]]] = {}
+        self._leaves: dict[str, set[str]] = {}
 
     def forbidden(self, name: str) -> frozenset[str]:
         """Given columns and scalars that may not be read for an answer, and what follows from them.
@@ -91,12 +93,12 @@ class Rearrangements:
 
     def ancestors(self, name: str) -> set[str]:
         """All that an answer builds on."""
-        return _closed(self._reads, self._reads[name])
+        return closed(self._reads, self._reads[name])
 
     def leaves(self, name: str) -> set[str]:
         """The parameters and data on which a quantity depends."""
         if name not in self._leaves:
-            found = _closed(self._reads, {name})
+            found = closed(self._reads, {name})
             self._leaves[name] = {n for n in found if not self._reads.get(n)}
         return self._leaves[name]
 
@@ -107,7 +109,7 @@ class Rearrangements:
 
     def steps(self, given: str, name: str) -> int:
         """Operations from what an answer builds on to a given quantity."""
-        found = _closed(self._apart(name), {given})
+        found = closed(self._apart(name), {given})
         loop = any(given in self._reads[n] for n in found)
         return sum(operations(self.items[n].rules[-1]) for n in found) + (STEP + 1) * loop
 
@@ -124,11 +126,7 @@ class Rearrangements:
         for reader, read in reads.items():
             for name in read:
                 readers.setdefault(name, set()).add(reader)
-        return _closed(readers, names)
-
-    @cached_property
-    def _leaves(self) -> dict[str, set[str]]:
-        return {}
+        return closed(readers, names)
 
     @cached_property
     def _reads(self) -> dict[str, set[str]]:
@@ -299,16 +297,6 @@ def _joined(first: Vectors, second: Vectors) -> Vectors:
         lost = ~((share > LOST) & (share < 1 / LOST)).all(axis=2)
     found[:2, lost] = np.nan  # beside a large number there is no telling whether it counts
     return found.reshape(-1, first.shape[1])
-
-
-def _closed(following: dict[str, set[str]], names: Iterable[str]) -> set[str]:
-    """Names, what follows them, what follows that, and so on."""
-    found, waiting = set(names), list(names)
-    while waiting:
-        more = following.get(waiting.pop(), set()) - found
-        found |= more
-        waiting += more
-    return found
 
 
 def _names(rule: Basic) -> set[str]:

@@ -10,18 +10,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from functools import cached_property
 from pathlib import Path
 
 from kfsheet.coursework.judging.calculated_answers import Cells, filled, same
 from kfsheet.coursework.judging.model_runs import ModelRuns, World
 from kfsheet.coursework.judging.recalculation_process import calculated
 from kfsheet.coursework.reading.cell_addresses import CellAddresses
-from kfsheet.coursework.reading.submission import read_submission
+from kfsheet.coursework.reading.submission import Book
 from kfsheet.errors import FormulaError, KfsheetError
 from kfsheet.model.exercise import asked_steps
-from kfsheet.parsing.calculator import Content, Formula
-from kfsheet.parsing.references import Address, Cell
+from kfsheet.parsing.calculator import Formula
+from kfsheet.parsing.references import Address
 from kfsheet.parsing.syntax import parse_formula
 from kfsheet.workbook.engines.libreoffice import libreoffice
 from kfsheet.workbook.engines.spreadsheet_engine import CellValue, Changes
@@ -37,8 +36,8 @@ CELLS = {"ironcalc": 60_000, "libreoffice": 20_000}  # of the model, loaded or c
 class Recalculation:
     """Asks engines about one workbook, as long as its time lasts."""
 
-    def __init__(self, path: Path, runs: ModelRuns) -> None:
-        self._path, self._runs, self._left = path, runs, SECONDS
+    def __init__(self, path: Path, book: Book, runs: ModelRuns) -> None:
+        self._path, self._book, self._runs, self._left = path, book, runs, SECONDS
         self.late = False
         """Whether an answer was not judged because there was no time."""
 
@@ -53,13 +52,9 @@ class Recalculation:
                 found |= self._asked(engine, addresses, name, open_steps)
         return found
 
-    @cached_property
-    def _sheets(self) -> dict[str, dict[Cell, Content]]:
-        return read_submission(self._path).sheets
-
     def _may_be_read(self, cell: Address) -> bool:
         """Whether a formula can be read, by whoever knows its functions."""
-        content = self._sheets.get(cell[0], {}).get(cell[1:])
+        content = self._book.sheets.get(cell[0], {}).get(cell[1:])
         if not isinstance(content, Formula):  # one of an array's cells
             return True
         try:
